@@ -245,9 +245,9 @@ class AssetReader {
   }
 
   void read_basis(const Json& json, AssetConfig& asset) const {
-    asset.basis_size = json.value("size", asset.basis_size);
+    asset.basis_size = optional_member<int>(json, "size");
     asset.basis_tolerance = optional_member<double>(json, "tolerance");
-    if (asset.basis_tolerance && json.contains("size")) refuse("/basis", "size or tolerance", "both");
+    if (asset.basis_tolerance && asset.basis_size) refuse("/basis", "size or tolerance", "both");
     asset.linear_modes = json.value("linear_modes", asset.linear_modes);
     asset.example_fields = json.value("example_fields", asset.example_fields);
     TrainingConfig& training = asset.training;

@@ -116,6 +116,9 @@ struct TrainingConfig {
   std::optional<LoadsConfig> loads;
 };
 
+/// Least number r of modes where an asset names none.
+inline constexpr int kBasisSize = 30;
+
 /// ASSET.json after validation, paths resolved against its folder. schemas/asset.json.
 struct AssetConfig {
   std::filesystem::path file;
@@ -139,7 +142,7 @@ struct AssetConfig {
   Weighting weighting = Weighting::kEigenvalue;
   AlignmentConfig alignment;
 
-  int basis_size = 30;                    ///< r
+  std::optional<int> basis_size;          ///< r; both absent: kBasisSize, or more where the examples need it
   std::optional<double> basis_tolerance;  ///< limit of the error in held-out runs, instead of a size
   int linear_modes = 15;
   bool example_fields = true;

@@ -87,8 +87,6 @@ Json assumed_asset(const std::filesystem::path& surface, const std::filesystem::
                     {"poisson_ratio", 0.4},
                     {"density", kDensity}}}}},
                 {"shape_space", {{"tolerance", 0.02}}},
-                {"basis", {{"size", 30}}},
-                {"cubature", {{"elements", 60}}},
                 {"seed", 1}};
   for (const char* clamp : kClamps)
     if (file.parts.contains(clamp)) asset["object"]["fixed"] = {{"part", clamp}};

@@ -2,9 +2,11 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <string>
 
+#include "common/config/asset_config.h"
 #include "common/core/error.h"
 
 namespace exmat::precompute {
@@ -14,6 +16,8 @@ namespace {
 constexpr double kSnapshotAmplitude = 0.25;
 // Principal components below this, relative to the largest singular value, are rounding.
 constexpr double kRankTolerance = 1e-9;
+// Share of an example's displacement that a basis of its own choice of size may lose.
+constexpr double kFieldLoss = 0.05;
 // Share of modes beside the motions of a scene, in norm.
 constexpr double kUnseenShare = 0.03;
 
@@ -88,6 +92,16 @@ void finish(const BasisInput& input, Eigen::MatrixXd& basis) {
   fix_signs(basis);
 }
 
+// Example fields of unit norm each, without rigid motions.
+Eigen::MatrixXd unit_fields(const ElasticSystem& system, Eigen::MatrixXd fields) {
+  remove_components(system.mass, system.null_space, fields);
+  for (auto field : fields.colwise()) field /= std::sqrt(field.dot(system.mass * field));
+  return fields;
+}
+
+// Of a basis, that example fields may take.
+Eigen::Index most_fields(int size) { return std::max({1, size / 2, size - kBasisSize / 2}); }
+
 // All of the columns have unit norm together.
 Eigen::MatrixXd of_unit_norm(const SparseMatrix& norm, const Eigen::MatrixXd& columns) {
   return columns / std::sqrt(columns.cwiseProduct(norm * columns).sum());
@@ -95,14 +109,22 @@ Eigen::MatrixXd of_unit_norm(const SparseMatrix& norm, const Eigen::MatrixXd& co
 
 }  // namespace
 
+int basis_size_for(const ElasticSystem& system, const Eigen::MatrixXd& fields) {
+  if (fields.cols() <= most_fields(kBasisSize)) return kBasisSize;
+  const Eigen::MatrixXd unit = unit_fields(system, fields);
+  const Eigen::MatrixXd components = principal_components(system.mass, unit, unit.cols());
+  const Eigen::MatrixXd shares = components.transpose() * (system.mass * unit);
+  Eigen::Index count = most_fields(kBasisSize);
+  const auto lost = [&] { return shares.bottomRows(shares.rows() - count).colwise().norm().maxCoeff(); };
+  while (count < shares.rows() && lost() > kFieldLoss) ++count;
+  return static_cast<int>(count) + kBasisSize / 2;
+}
+
 Eigen::MatrixXd modal_basis(const BasisInput& input, int size) {
   const auto& mass = input.system.mass;
   Eigen::MatrixXd basis(mass.rows(), 0);
   if (input.example_fields.cols() > 0) {
-    Eigen::MatrixXd fields = input.example_fields;
-    remove_components(mass, input.system.null_space, fields);
-    for (auto field : fields.colwise()) field /= std::sqrt(field.dot(mass * field));
-    basis = principal_components(mass, fields, std::max<Eigen::Index>(1, size / 2));
+    basis = principal_components(mass, unit_fields(input.system, input.example_fields), most_fields(size));
   }
   fill_up(input, size, basis);
   finish(input, basis);
@@ -123,8 +145,16 @@ Eigen::MatrixXd trained_basis(const BasisInput& input, const Eigen::MatrixXd& sn
   Eigen::MatrixXd columns(snapshots.rows(), snapshots.cols() + modal.cols());
   columns << of_unit_norm(norm, snapshots), (general ? 1 : kUnseenShare) * modal;
   remove_components(system.mass, system.null_space, columns);
-  Eigen::MatrixXd basis = principal_components(norm, columns, size);
-  require_modes(basis.cols(), size);
+  Eigen::MatrixXd basis(columns.rows(), 0);
+  if (input.example_fields.cols() > most_fields(kBasisSize)) {  // more than runs of a few loads show
+    basis = principal_components(system.mass, unit_fields(system, input.example_fields), most_fields(size));
+    remove_components(system.mass, basis, columns);
+  }
+  const Eigen::Index before = basis.cols();
+  const Eigen::MatrixXd components = principal_components(norm, columns, size - before);
+  require_modes(before + components.cols(), size);
+  basis.conservativeResize(Eigen::NoChange, size);
+  basis.rightCols(size - before) = components;
   orthonormalise(system.mass, basis);
   finish(input, basis);
   return basis;

@@ -12,16 +12,21 @@ struct BasisInput {
   Eigen::MatrixXd example_fields;      ///< f x (K-1) displacements that the basis must hold, or no columns
 };
 
+/// Modes that example fields [f x N] ask for: kBasisSize, or as many principal components as hold each field to 5 %,
+/// and half of kBasisSize beside them.
+int basis_size_for(const ElasticSystem& system, const Eigen::MatrixXd& fields);
+
 /// [f x r] mass-orthonormal basis, orthogonal to the rigid motions of a free body: the example fields (their principal
-/// components where they would take more than half of r), then the principal components of scaled modes and modal
-/// derivatives in their complement. Scaling: docs/method.md, section 2, after Barbic and James 2005, section 4.1.
-/// Throws InputError (without a file) where the snapshots span fewer than r dimensions.
+/// components where they would leave less to modes than half of r or of kBasisSize), then the principal components of
+/// scaled modes and modal derivatives in their complement. Scaling: docs/method.md, section 2, after Barbic and James
+/// 2005, section 4.1. Throws InputError (without a file) where the snapshots span fewer than r dimensions.
 Eigen::MatrixXd modal_basis(const BasisInput& input, int size);
 
 /// The same of `snapshots` [f x N] of motions: their principal components in the norm M + K / omega_5^2, which weighs
 /// displacement and strain alike. What modal_basis() is made of is mixed in with 3 % of their norm, so that loads which
-/// no run had find the lowest modes. With `general` both have the same norm, in M + K / omega_1^2: for loads that the
-/// snapshots do not know. Throws as modal_basis() does, of all this.
+/// no run had find the lowest modes. Fields of so many examples that basis_size_for() takes more for them come first.
+/// With `general` both have the same norm, in M + K / omega_1^2: for loads that the snapshots do not know. Throws as
+/// modal_basis() does, of all this.
 Eigen::MatrixXd trained_basis(const BasisInput& input, const Eigen::MatrixXd& snapshots, bool general, int size);
 
 }  // namespace exmat::precompute

@@ -92,7 +92,7 @@ BasisChoice BasisChooser::choose(int size) const {
 
 BasisChoice BasisChooser::choose() const {
   const auto& tolerance = stages_.asset.basis_tolerance;
-  if (!tolerance) return choose(stages_.asset.basis_size);
+  if (!tolerance) return choose(stages_.asset.basis_size.value_or(basis_size_for(stages_.system, fields_)));
   if (motions_ == nullptr)
     throw InputError({"", "/basis/tolerance", "loads to train on, which the error is measured by", "none",
                       "name a scene by --scene or loads by basis.loads, or give basis.size"});

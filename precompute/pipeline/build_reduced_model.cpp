@@ -447,7 +447,8 @@ void Pipeline::refuse_full_space() {
 std::string generator() { return fmt::format("exmat-precompute {}", version()); }
 
 void Pipeline::read() {
-  if (needs_.internal_force == ForceMethod::kPolynomial) require_polynomial(asset_.material.model, asset_.basis_size);
+  if (needs_.internal_force == ForceMethod::kPolynomial)
+    require_polynomial(asset_.material.model, asset_.basis_size.value_or(kBasisSize));
   object_ = timed("reading the object", [&] { return read_object(asset_, report_.inputs, cache_); });
   if (options_.scene != nullptr) {
     own_scene_ = *options_.scene;

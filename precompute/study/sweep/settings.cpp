@@ -92,7 +92,7 @@ void require_possible(const PointSettings& point, const AssetConfig& asset, cons
 PointSettings own_settings(const AssetConfig& asset, const SceneConfig& scene) {
   PointSettings own;
   own.eigenfunctions = asset.eigenfunctions;
-  own.basis_size = asset.basis_size;
+  own.basis_size = asset.basis_size.value_or(kBasisSize);
   own.linear_modes = asset.linear_modes;
   own.training = name_of(asset.training.from);
   own.cubature_elements = asset.cubature_elements;

@@ -146,6 +146,43 @@ TEST_P(Basis, HoldsTheExampleFields) {
   EXPECT_LE((U.transpose() * (system_.mass * U) - Eigen::MatrixXd::Identity(20, 20)).cwiseAbs().maxCoeff(), 1e-12);
 }
 
+// As many components as a plain SVD of the factored unit fields says, and half of 30 beside them; both bases hold each
+// field to 5 % then.
+TEST_P(Basis, GrowsWithWhatManyExamplesNeed) {
+  std::mt19937 generator(7);
+  std::normal_distribution<double> normal;
+  const auto random = [&](Eigen::Index rows, Eigen::Index columns) {
+    return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(generator); }).eval();
+  };
+  Eigen::MatrixXd fields = random(system_.mass.rows(), 19) * random(19, 24) + 0.02 * random(system_.mass.rows(), 24);
+  EXPECT_EQ(basis_size_for(system_, fields.leftCols(15)), 30);
+  if (system_.null_space.cols() > 0)
+    fields -= system_.null_space * (system_.null_space.transpose() * (system_.mass * fields));
+  for (auto field : fields.colwise()) field /= std::sqrt(field.dot(system_.mass * field));
+  const Eigen::MatrixXd factored = Eigen::MatrixXd(system_.mass).llt().matrixU() * fields;
+  const auto svd = factored.bdcSvd(Eigen::ComputeThinU);
+  const auto lost_by = [&](Eigen::Index count) {
+    const Eigen::MatrixXd U = svd.matrixU().leftCols(count);
+    return (factored - U * (U.transpose() * factored)).colwise().norm().maxCoeff();
+  };
+  const int size = basis_size_for(system_, fields);
+  EXPECT_GT(size, 30);
+  EXPECT_LE(lost_by(size - 15), 0.05);
+  EXPECT_GT(lost_by(size - 16), 0.05);
+  const BasisInput input{system_, modes_, derivatives_, bounding_box_diagonal(mesh_.vertices), fields};
+  const Eigen::MatrixXd motions = modes_.modes.leftCols(2);
+  for (const Eigen::MatrixXd& U : {modal_basis(input, size), trained_basis(input, motions, false, size),
+                                   trained_basis(input, motions, true, size)}) {
+    ASSERT_EQ(U.cols(), size);
+    EXPECT_LE((U.transpose() * (system_.mass * U) - Eigen::MatrixXd::Identity(size, size)).cwiseAbs().maxCoeff(),
+              1e-12);
+    for (const Eigen::VectorXd field : fields.colwise()) {
+      const Eigen::VectorXd rest = field - U * (U.transpose() * (system_.mass * field));
+      EXPECT_LE(std::sqrt(rest.dot(system_.mass * rest)), 0.05);
+    }
+  }
+}
+
 TEST_P(Basis, ClampedFieldsAreInEquilibriumWithTheirClamp) {
   if (!clamped()) GTEST_SKIP();
   const Eigen::MatrixXd fields = Eigen::MatrixXd::Random(system_.full_mass.rows(), 1);
