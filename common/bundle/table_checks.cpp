@@ -25,9 +25,50 @@ bool descend(IntegerRow& row) {
 
 std::string text_of(const IntegerRow& row) { return fmt::format("{}", fmt::join(row.begin(), row.end(), " ")); }
 
+// Terms of one and two examples in ascending order, behind the row of the constant: of a term of degree n all rows
+// that add up to n and are positive at its examples, 0 at others but the first.
+std::optional<ValueFault> check_pair_rows(std::int64_t degree, const IndexMatrix& rows) {
+  using Members = std::pair<Eigen::Index, Eigen::Index>;  // the second one 0 where there is none
+  const auto members = [&](Eigen::Index i) -> std::optional<Members> {
+    Members found{0, 0};
+    for (Eigen::Index k = 1; k < rows.cols(); ++k) {
+      if (rows(i, k) == 0) continue;
+      if (found.second > 0) return std::nullopt;
+      (found.first == 0 ? found.first : found.second) = k;
+    }
+    return found.first > 0 ? std::optional(found) : std::nullopt;
+  };
+  const auto comes_before = [](const Members& a, const Members& b) {
+    return std::pair(a.second > 0, a) < std::pair(b.second > 0, b);
+  };
+  Members last{0, 0};
+  for (Eigen::Index i = 1; i < rows.rows();) {
+    const std::optional<Members> own = members(i);
+    const std::int64_t sum = rows.row(i).cast<std::int64_t>().sum();
+    if (!own || !comes_before(last, *own) || sum > degree)
+      return ValueFault{
+          fmt::format("one or two examples behind those of the row before, to at most {}, in row {}", degree, i),
+          text_of(rows.row(i).cast<std::int64_t>())};
+    last = *own;
+    const std::int64_t pair = own->second > 0 ? 1 : 0;
+    for (std::int64_t a = 1; a <= sum - pair; ++a)
+      for (std::int64_t b = pair; b <= pair * (sum - a); ++b, ++i) {
+        IntegerRow expected = IntegerRow::Zero(rows.cols());
+        expected[0] = sum - a - b;
+        expected[own->first] = a;
+        if (pair > 0) expected[own->second] = b;
+        if (i == rows.rows()) return ValueFault{fmt::format("a row {} after the last", text_of(expected)), "none"};
+        const IntegerRow row = rows.row(i).cast<std::int64_t>();
+        if (row != expected) return ValueFault{fmt::format("{} in row {}", text_of(expected), i), text_of(row)};
+      }
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::optional<ValueFault> check_exponent_rows(std::int64_t degree, const IndexMatrix& rows) {
+  if (rows.rows() > 0 && (rows.row(0).array() == 0).all()) return check_pair_rows(degree, rows);
   IntegerRow expected = IntegerRow::Zero(rows.cols());
   expected[0] = degree;
   bool more = true;

@@ -9,8 +9,6 @@ LedgerEntry plan_targets(const Needs& needs, const LedgerEntry& examples, std::i
   if (!examples.included) return {"targets", false, 0, examples.reason};
   if (!needs.targets) return {"targets", false, 0, "no table of targets is asked for"};
   if (example_count < 2) return {"targets", false, 0, "the rest pose is the only example"};
-  if (example_count > kMostTableExamples)
-    return {"targets", false, 0, "a table serves at most " + std::to_string(kMostTableExamples) + " examples"};
   return {"targets", true, 0, "an example force is asked for"};
 }
 

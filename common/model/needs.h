@@ -10,9 +10,6 @@
 
 namespace exmat {
 
-/// Most examples, the rest pose among them, that a table of targets is made for; it takes two.
-inline constexpr std::int64_t kMostTableExamples = 4;
-
 /// Needs of a scene from one region.
 struct RegionNeeds {
   std::string name;
@@ -28,7 +25,7 @@ struct Needs {
   bool examples = true;                               ///< /shape_space, /examples, /projection
   bool rigid = true;                                  ///< /rigid, of a free body
   bool carried = false;                               ///< /rigid, of a body with fixed vertices that a motion carries
-  bool targets = true;                                ///< /targets, of at most kMostTableExamples examples
+  bool targets = true;                                ///< /targets, of two examples or more
   bool target_space = true;                           ///< /target_space
   bool target_elasticity = false;                     ///< /target_elasticity, of an elastic example force
   bool full_space = true;                             ///< /full_space, of a body that may step in all vertices

@@ -119,7 +119,9 @@ struct PolynomialData {
 /// the weight of the second example and s = (t - t_i) / (t_i+1 - t_i).
 struct TargetTableData {
   std::int64_t degree = 0;
-  IndexMatrix exponents;     ///< c x K, a, each row adds up to D; lexicographic, descending
+  /// c x K, a, each row adds up to D; lexicographic, descending. Of terms of one and two examples (is_of_pairs()) the
+  /// first row is zero; then come those of each term, which add up to its own degree, at most D.
+  IndexMatrix exponents;
   RowMatrix control_points;  ///< P c x r (dataset P c r), P_a in reduced coordinates, pieces in order
   Eigen::VectorXd knots = Eigen::Vector2d(0, 1);  ///< P + 1, t_i: 0, ..., 1, each above the one before it
   double error = 0;  ///< largest found, in the energy norm at rest, relative to the largest example
@@ -131,6 +133,11 @@ struct TargetTableData {
   double compensated_stiffness = 0;
   Eigen::Vector3d compensated_gravity = Eigen::Vector3d::Zero();
 };
+
+/// Whether a table is the sum of terms of one and two examples.
+inline bool is_of_pairs(const TargetTableData& table) {
+  return table.exponents.rows() > 0 && (table.exponents.row(0).array() == 0).all();
+}
 
 /// Group /target_space: the same targets to be solved for, in d displacements of their own that hold them all.
 struct TargetSpaceData {

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "common/model/needs.h"
+#include "precompute/targets/target_table.h"
 
 namespace exmat::precompute {
 namespace {
@@ -45,7 +45,7 @@ Json assumed_scene(const Json& asset, const std::string& name, const SurfaceFile
     add(start + 1 + kTurn, 0);
   }
   scene["examples"] = {{"stiffness", kStiffness}, {"damping", kDamping}, {"weights", {{"keys", keys}}}};
-  if (!surface.skeleton && static_cast<std::int64_t>(poses) + 1 <= kMostTableExamples)
+  if (!surface.skeleton && static_cast<std::int64_t>(poses) + 1 <= kMostPolynomialExamples)
     scene["examples"]["compensate"] = true;
   return scene;
 }

@@ -246,7 +246,7 @@ void PoseSettler::compensate() {
     throw InputError({load_.file, place, expected, found, advice});
   };
   if (!model_.targets)
-    refuse("/examples/compensate", "a table of targets, of 2 to 4 examples of the whole body", "none",
+    refuse("/examples/compensate", "a table of targets of the whole body's examples", "none",
            "leave compensate out, or have the asset make a table: targets.tolerance");
   const double stiffness = load_.examples.front().stiffness;
   if (!(stiffness > 0))

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
+#include <random>
+#include <utility>
 #include <vector>
 
 namespace exmat::precompute {
@@ -74,6 +76,25 @@ RowMatrix spread_points(Eigen::Index coordinates, int per_dimension) {
       for (Eigen::Index k = 0, used = 0; k < coordinates; ++k)
         points(points.rows() - 1, k) = (members >> k & 1U) != 0 ? inside[used++] : 0;
     }
+  }
+  return points;
+}
+
+RowMatrix some_together(Eigen::Index coordinates, Eigen::Index together, int count, std::uint64_t seed) {
+  std::mt19937_64 generator(seed);
+  // Exponential shares are uniform on the simplex.
+  const auto share = [&] { return -std::log((static_cast<double>(generator() % 1024) + 0.5) / 1024); };
+  RowMatrix points = RowMatrix::Zero(count, coordinates);
+  std::vector<std::size_t> order;
+  for (std::size_t k = 1; k < static_cast<std::size_t>(coordinates); ++k) order.push_back(k);
+  const std::size_t most = std::min(order.size(), static_cast<std::size_t>(together));
+  for (auto row : points.rowwise()) {
+    for (std::size_t i = 0; i < most; ++i) {
+      std::swap(order[i], order[i + generator() % (order.size() - i)]);
+      row[static_cast<Eigen::Index>(order[i])] = share();
+    }
+    if (row.sum() == 0 || generator() % 2 == 0) row[0] = share();
+    row /= row.sum();
   }
   return points;
 }

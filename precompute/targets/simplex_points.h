@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstdint>
+
 #include "common/core/arrays.h"
 
 namespace exmat::precompute {
@@ -12,5 +14,9 @@ RowMatrix interpolation_nodes(const IndexMatrix& exponents);
 /// Evenly spread points inside every edge, face, ... of the simplex of K coordinates, `per_dimension` times its
 /// dimension on each of them, in a low-discrepancy sequence (Roberts 2018). [count x K]
 RowMatrix spread_points(Eigen::Index coordinates, int per_dimension);
+
+/// Weights where `together` of the coordinates but the first are positive, which ones and their shares at random, and
+/// the first one's in about every second row. [count x K]
+RowMatrix some_together(Eigen::Index coordinates, Eigen::Index together, int count, std::uint64_t seed);
 
 }  // namespace exmat::precompute

@@ -7,13 +7,13 @@
 #include <random>
 
 #include "common/elastic/materials.h"
-#include "common/model/needs.h"
 #include "precompute/cubature/element_samples.h"
 #include "precompute/cubature/selection.h"
 #include "precompute/targets/element_forces.h"
 #include "precompute/targets/example_stress.h"
 #include "precompute/targets/minimum_finder.h"
 #include "precompute/targets/simplex_points.h"
+#include "precompute/targets/target_table.h"
 
 namespace exmat::precompute {
 namespace {
@@ -63,7 +63,7 @@ class ElementChooser {
 RowMatrix ElementChooser::weights(int per_dimension) const {
   const Eigen::Index count = coordinates_.poses.cols();
   if (count < 2) return RowMatrix::Ones(1, 1);
-  if (count <= kMostTableExamples) return spread_points(count, per_dimension);
+  if (count <= kMostPolynomialExamples) return spread_points(count, per_dimension);
   std::mt19937_64 generator(options_.seed + static_cast<std::uint64_t>(per_dimension));
   std::exponential_distribution<double> share;
   RowMatrix weights(8 * per_dimension, count);

@@ -8,7 +8,6 @@
 
 #include "common/core/log.h"
 #include "common/mesh/elements.h"
-#include "common/model/needs.h"
 #include "precompute/targets/minimum_finder.h"
 #include "precompute/targets/simplex_points.h"
 #include "precompute/targets/table_error.h"
@@ -21,50 +20,43 @@ namespace {
 
 using runtime::TargetSolver;
 
-constexpr double kShare = 0.1;         // of the tolerance that the space may take
-constexpr int kRounds = 4;             // in which weights whose targets the space misses are added
-constexpr double kNoDirection = 1e-9;  // of the largest example: a direction of poses that is rounding
-constexpr double kSame = 0.1;          // of the tolerance: answers nearer to each other are one minimum
-constexpr int kTableChecks = 8;        // targets of all tets on every edge of the simplex, that a table is checked by
+constexpr double kShare = 0.1;              // of the tolerance that the space may take
+constexpr int kRounds = 4;                  // in which weights whose targets the space misses are added
+constexpr double kNoDirection = 1e-9;       // of the largest example: a direction of poses that is rounding
+constexpr double kSame = 0.1;               // of the tolerance: answers nearer to each other are one minimum
+constexpr double kManyTolerance = 100;      // times the tolerance, of more examples than one polynomial is for
+constexpr int kCheckedTogether[] = {2, 3};  // of many examples, whose targets the space is checked by
+constexpr int kTableChecks = 8;  // targets of all tets on every edge of the simplex, that a table is checked by
 
-// One, two or three examples at equal shares, then all of them.
-RowMatrix equal_shares(Eigen::Index examples) {
-  std::vector<Eigen::VectorXd> rows;
-  const auto add = [&](std::initializer_list<Eigen::Index> members) {
-    rows.emplace_back(Eigen::VectorXd::Zero(examples));
-    for (const Eigen::Index k : members) rows.back()[k] = 1.0 / static_cast<double>(members.size());
-  };
-  for (Eigen::Index i = 0; i < examples; ++i) {
-    add({i});
-    for (Eigen::Index j = 0; j < i; ++j) {
-      add({i, j});
-      for (Eigen::Index k = 0; k < j; ++k) add({i, j, k});
-    }
-  }
-  rows.emplace_back(Eigen::VectorXd::Constant(examples, 1.0 / static_cast<double>(examples)));
-  RowMatrix weights(std::ssize(rows), examples);
-  for (Eigen::Index i = 0; i < weights.rows(); ++i) weights.row(i) = rows[static_cast<std::size_t>(i)].transpose();
+bool is_of_many(Eigen::Index examples) { return examples > kMostPolynomialExamples; }
+
+// Each example half, the rest pose the other half.
+RowMatrix halves(Eigen::Index examples) {
+  RowMatrix weights = RowMatrix::Zero(examples - 1, examples);
+  weights.col(0).setConstant(0.5);
+  weights.rightCols(examples - 1).diagonal().setConstant(0.5);
   return weights;
 }
 
 // Weights that targets are solved for first: corners, edges, faces and the inside of the simplex.
 RowMatrix first_weights(Eigen::Index examples) {
-  if (examples > kMostTableExamples) return equal_shares(examples);
+  if (is_of_many(examples)) return halves(examples);
   const int degree = examples == 2 ? 8 : examples == 3 ? 5 : 4;
   return interpolation_nodes(runtime::BernsteinBasis(degree, static_cast<int>(examples)).exponents());
 }
 
 // Other ones, to check by: `round` counts from 0.
 RowMatrix check_weights(Eigen::Index examples, int round) {
-  if (examples <= kMostTableExamples) {
+  if (!is_of_many(examples)) {
     const int count = examples == 2 ? 9 : 3;
     const RowMatrix spread = spread_points(examples, count * (round + 1));
     return spread;
   }
-  const RowMatrix even = equal_shares(examples);  // uneven ones: three parts of one, one of the next
-  RowMatrix weights(even.rows(), examples);
-  for (Eigen::Index i = 0; i < even.rows(); ++i)
-    weights.row(i) = 0.75 * even.row(i) + 0.25 * even.row((i + round + 1) % even.rows());
+  RowMatrix weights(std::ssize(kCheckedTogether) * examples, examples);
+  for (std::size_t i = 0; i < std::size(kCheckedTogether); ++i)
+    weights.middleRows(static_cast<Eigen::Index>(i) * examples, examples) =
+        some_together(examples, kCheckedTogether[i], static_cast<int>(examples),
+                      static_cast<std::uint64_t>(kCheckedTogether[i] + 100 * (round + 1)));
   return weights;
 }
 
@@ -104,6 +96,8 @@ class SpaceBuilder {
         element_count_(elements_of(object.mesh, object.materials).count()),
         whole_(target_in(range)),
         count_(range.poses.cols()),
+        tolerance_((is_of_many(count_) ? kManyTolerance : 1) * options.tolerance),
+        enough_(kShare * tolerance_),
         examples_(whole_.solver.dimension(), count_) {
     for (Eigen::Index k = 0; k < count_; ++k) examples_.col(k) = whole_.solver.example(k);
     scale_ = examples_.colwise().norm().maxCoeff();
@@ -117,7 +111,7 @@ class SpaceBuilder {
   double check(int round);
   MeshTarget target_in(const PoseCoordinates& coordinates) const;
   TargetTableOptions table_options() const {
-    return {.tolerance = options_.tolerance, .energy_reference = options_.energy_reference};
+    return {.tolerance = tolerance_, .energy_reference = options_.energy_reference};
   }
   void add_table(TargetSpace& space) const;
   void add_table_of_many(TargetSpace& space, TargetTableReport& report) const;
@@ -132,6 +126,8 @@ class SpaceBuilder {
   Eigen::Index element_count_;
   MeshTarget whole_;
   Eigen::Index count_;
+  double tolerance_;          // of the table
+  double enough_;             // of it, that the space may take
   Eigen::MatrixXd examples_;  // d' x K, in unit coordinates of the range
   double scale_ = 0;
   Eigen::MatrixXd samples_;  // d' x N, targets
@@ -147,7 +143,7 @@ MeshTarget SpaceBuilder::target_in(const PoseCoordinates& coordinates) const {
 
 // [d' x N], those that were found.
 Eigen::MatrixXd SpaceBuilder::solve(const RowMatrix& weights, const MinimumFinder::Starts& starts) {
-  MinimumFinder finder(whole_.solver, kSame * options_.tolerance * scale_, whole_.all.get());
+  MinimumFinder finder(whole_.solver, kSame * tolerance_ * scale_, whole_.all.get());
   const RowMatrix minima = finder.find(weights, starts, "targets on the whole mesh");
   std::vector<Eigen::Index> found;
   for (Eigen::Index i = 0; i < minima.rows(); ++i)
@@ -163,13 +159,13 @@ PoseCoordinates SpaceBuilder::coordinates() const {
 // the largest example.
 double SpaceBuilder::check(int round) {
   const RowMatrix weights = check_weights(count_, round);
-  MinimumFinder finder(small_.solver, kSame * options_.tolerance * scale_, small_.all.get());
+  MinimumFinder finder(small_.solver, kSame * tolerance_ * scale_, small_.all.get());
   const RowMatrix inside = finder.find(weights, from_blend(small_.solver), "targets in their space");
   const Eigen::MatrixXd guesses = columns_ * (small_.solver.basis() * inside.transpose());
   const auto from_space = [&](const Eigen::VectorXd&, Eigen::Index row) {
     return std::vector<Eigen::VectorXd>{guesses.col(row)};
   };
-  MinimumFinder polish(whole_.solver, kSame * options_.tolerance * scale_, whole_.all.get());
+  MinimumFinder polish(whole_.solver, kSame * tolerance_ * scale_, whole_.all.get());
   polish.starts_are_near();
   const RowMatrix minima = polish.find(weights, from_space, "targets on the whole mesh");
   double error = 0;
@@ -187,7 +183,7 @@ double SpaceBuilder::check(int round) {
 }
 
 TargetSpace SpaceBuilder::build() {
-  const double distance = kShare * options_.tolerance * scale_;
+  const double distance = enough_ * scale_;
   samples_ = Eigen::MatrixXd(examples_.rows(), 0);
   if (scale_ > 0 && count_ > 1) samples_ = solve(first_weights(count_), from_blend(whole_.solver));
   TargetSpace space;
@@ -198,7 +194,7 @@ TargetSpace SpaceBuilder::build() {
     small_ = target_in(space.coordinates);
     if (scale_ == 0 || count_ < 2) break;
     space.error = check(round);
-    if (space.error <= kShare * options_.tolerance) break;
+    if (space.error <= enough_) break;
   }
   space.left_out = whole_.left_out;
   log::info(fmt::format("targets: {} displacements hold them, error {:.1e}", columns_.cols(), space.error));
@@ -230,7 +226,8 @@ void SpaceBuilder::add_table_of_many(TargetSpace& space, TargetTableReport& repo
   if (accurate && !build_target_table(elements, poses, options, report)) return;
   options.all = small_.all.get();
   options.first_degree = accurate && report.pieces == 1 ? report.degree : options.first_degree;
-  if (accurate && report.pieces == 1) space.table = corrected_table(elements, poses, options, report);
+  if (accurate && report.pieces == 1 && !is_of_many(count_))
+    space.table = corrected_table(elements, poses, options, report);
   if (!space.table) space.table = build_target_table(accurate ? elements : small_.solver, poses, options, report);
 }
 
@@ -258,7 +255,7 @@ std::optional<TargetTableData> SpaceBuilder::corrected_table(const TargetSolver&
 MinimumFinder::Correction SpaceBuilder::correction_of(const TargetSolver& elements) const {
   const runtime::BernsteinBasis basis(count_ == 2 ? 14 : count_ == 3 ? 8 : 5, static_cast<int>(count_));
   const RowMatrix weights = interpolation_nodes(basis.exponents());
-  const double same = kSame * options_.tolerance * scale_;
+  const double same = kSame * tolerance_ * scale_;
   MinimumFinder of_elements(elements, same), of_all(elements, same, small_.all.get());
   const RowMatrix rough = of_elements.find(weights, from_blend(elements), "targets of the elements"),
                   exact = of_all.find(weights, from_blend(elements), "targets of all tets");

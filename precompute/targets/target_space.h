@@ -14,7 +14,7 @@ struct TargetSpaceOptions {
   EnergyReference energy_reference = EnergyReference::kExample;
   double tolerance = 1e-4;          ///< loss of the targets by the space and the table, as TargetTableData has it
   double element_tolerance = 1e-3;  ///< loss by the elements, beside that
-  bool table = true;                ///< make one, where 2 <= K <= kMostTableExamples
+  bool table = true;                ///< make one, where K >= 2
   std::uint64_t seed = 1;           ///< seed of the poses that the elements are chosen by
   /// That energies are summed over at every step. Targets of more begin with a sample of their elements, and a table of
   /// them with the elements.

@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 
 #include "common/core/timer.h"
-#include "common/model/needs.h"
 #include "precompute/targets/minimum_finder.h"
+#include "precompute/targets/pair_terms.h"
 #include "precompute/targets/simplex_points.h"
 #include "precompute/targets/table_error.h"
 #include "precompute/targets/target_pieces.h"
@@ -204,20 +204,27 @@ std::optional<TargetTableData> build_target_table(const TargetSolver& target, co
                                                   const TargetTableOptions& options, TargetTableReport& report) {
   const Timer timer;
   report = {};
-  if (const Eigen::Index count = poses.cols(); count < 2 || count > kMostTableExamples) {
-    report.message =
-        count < 2 ? "no table of targets: one example alone needs none"
-                  : fmt::format("no table of targets: {} examples, at most {}; use \"target\": \"solve\" in the scene",
-                                count, kMostTableExamples);
+  if (poses.cols() < 2) {
+    report.message = "no table of targets: one example alone needs none";
     return std::nullopt;
   }
-  auto data = TableBuilder(target, poses, options, report).run();
+  auto data = poses.cols() > kMostPolynomialExamples ? build_pair_terms(target, poses, options, report)
+                                                     : TableBuilder(target, poses, options, report).run();
   report.seconds = timer.seconds();
   return data;
 }
 
 void shift_targets(const Eigen::MatrixXd& shifts, TargetTableData& table) {
   const Eigen::Index points = table.exponents.rows(), pieces = table.knots.size() - 1;
+  if (is_of_pairs(table)) {  // the constant and the terms of one example are the linear functions
+    table.control_points.row(0) += shifts.col(0).transpose();
+    for (Eigen::Index row = 1; row < points; ++row)
+      for (Eigen::Index k = 1; k < shifts.cols(); ++k)
+        if (const auto a = table.exponents.row(row); a[k] > 0 && a[0] + a[k] == a.sum())
+          table.control_points.row(row) +=
+              static_cast<double>(a[k]) / a.sum() * (shifts.col(k) - shifts.col(0)).transpose();
+    return;
+  }
   for (Eigen::Index row = 0; row < pieces * points; ++row) {
     Eigen::VectorXd weights =
         table.exponents.row(row % points).cast<double>().transpose() / static_cast<double>(table.degree);

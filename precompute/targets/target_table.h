@@ -11,6 +11,10 @@
 
 namespace exmat::precompute {
 
+/// Most examples, the rest pose among them, whose table is one polynomial of all weights; of more it is the sum of
+/// terms of one and two.
+inline constexpr std::int64_t kMostPolynomialExamples = 4;
+
 struct TargetTableOptions {
   double tolerance = 1e-4;  ///< largest error, as TargetTableData has it [Limit: > 0]
   EnergyReference energy_reference = EnergyReference::kExample;
@@ -38,12 +42,13 @@ struct TargetTableReport {
   double seconds = 0;
 };
 
-/// The table of the targets of 2 <= K <= kMostTableExamples examples, whose poses [x x K] are those of the solver in
+/// The table of the targets of K >= 2 examples, whose poses [x x K] are those of the solver in
 /// the x coordinates that it was built in; control points are in these. p*(w) is solved at the nodes of Isaac 2020 and
 /// fitted by least squares, by polynomials of growing degree until the error as the run time decodes it, also at
 /// further weights inside and on every edge and face of the simplex, is below the tolerance. Where no degree allowed
 /// gets there, K = 2 takes pieces (target_pieces.h); otherwise there is nothing, as where p*(w) jumps from one minimum
-/// to another. The same in every run and for every number of threads. docs/method.md, "Table of targets".
+/// to another. Of more than kMostPolynomialExamples see pair_terms.h. The same in every run and for every number of
+/// threads. docs/method.md, "Table of targets".
 std::optional<TargetTableData> build_target_table(const runtime::TargetSolver& target, const Eigen::MatrixXd& poses,
                                                   const TargetTableOptions& options, TargetTableReport& report);
 

@@ -322,6 +322,8 @@ void check_full_space(const SceneConfig& config, const LoadedScene& loaded) {
 }
 
 std::string describe_target(const ExampleModel& examples, const ExampleSettings& settings) {
+  if (examples.table && examples.table->is_of_pairs())
+    return fmt::format("target: table, terms of one and two examples, {} control points", examples.table->piece_rows());
   if (examples.table)
     return fmt::format(
         "target: table, {} of degree {}",

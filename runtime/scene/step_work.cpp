@@ -18,16 +18,9 @@ double internal_force_bytes(const InternalForce& force, const StepReport& report
          std::max(1, report.factorisations) * force.cubature().potential().stiffness_bytes();
 }
 
-/// (D + K - 1)! / (D! (K - 1)!)
-double control_points(const TargetTable& table) {
-  double count = 1;
-  for (int k = 1; k < table.examples(); ++k) count *= (table.degree() + k) / static_cast<double>(k);
-  return count;
-}
-
-/// The sum over the control points.
+/// The sum over the control points, of terms of one and two examples over those of all terms.
 void add_table(const TargetTable& table, StepWork& work) {
-  const double numbers = control_points(table) * static_cast<double>(table.modes());
+  const double numbers = static_cast<double>(table.piece_rows() * table.modes());
   work.target_flops += 2 * numbers;
   work.bytes += doubles(numbers);
 }

@@ -88,7 +88,8 @@ void ExampleWeights::set_candidate(Eigen::Index n, unsigned members) {
 ExampleWeights::Workspace ExampleWeights::make_workspace() const {
   const Eigen::Index count = examples();
   return {Eigen::VectorXd::Zero(padded(count)), Eigen::VectorXd::Zero(count), Eigen::VectorXd::Zero(count),
-          Eigen::MatrixXd::Zero(count, count),  Eigen::VectorXi::Zero(count), Eigen::VectorXi::Zero(count)};
+          Eigen::MatrixXd::Zero(count, count),  Eigen::VectorXd::Zero(count), 0,
+          Eigen::VectorXi::Zero(count),         Eigen::VectorXi::Zero(count)};
 }
 
 void ExampleWeights::solve(const Eigen::VectorXd& q, Workspace& workspace, Eigen::VectorXd& weights) const noexcept {
@@ -102,7 +103,7 @@ void ExampleWeights::solve(const Eigen::VectorXd& q, Workspace& workspace, Eigen
 }
 
 void ExampleWeights::solve_by_sets(Workspace& workspace, Eigen::VectorXd& weights) const noexcept {
-  auto& [padded_load, affine, slopes, system, corral, state] = workspace;
+  auto& [padded_load, affine, slopes, system, forward, factored, corral, state] = workspace;
   const auto load = padded_load.head(examples());
   Eigen::Index start = 0;
   (0.5 * gram_.diagonal() - load).minCoeff(&start);
@@ -112,6 +113,7 @@ void ExampleWeights::solve_by_sets(Workspace& workspace, Eigen::VectorXd& weight
   state[start] = kIn;
   corral[0] = static_cast<int>(start);
   int count = 1;
+  factored = 0;
 
   const double rounding = kWeightRounding * (gram_.cwiseAbs().maxCoeff() + load.cwiseAbs().maxCoeff());
   const auto limit = 10 * examples() + 10;  // the objective falls at every turn; the limit is for rounding and NaN
@@ -141,7 +143,7 @@ void ExampleWeights::solve_by_sets(Workspace& workspace, Eigen::VectorXd& weight
 /// Moves the weights to the minimum over the corral's affine hull, as far as they stay positive, dropping what reaches
 /// zero until the whole way is free. Returns the size of the corral.
 int ExampleWeights::shrink_to_simplex(Workspace& workspace, int count, Eigen::VectorXd& weights) const noexcept {
-  auto& [load, affine, slopes, system, corral, state] = workspace;
+  auto& [load, affine, slopes, system, forward, factored, corral, state] = workspace;
   for (;;) {
     double length = 1;
     int leaving = -1;
@@ -159,19 +161,22 @@ int ExampleWeights::shrink_to_simplex(Workspace& workspace, int count, Eigen::Ve
     state[corral[leaving]] = kOut;
     for (int i = leaving; i + 1 < count; ++i) corral[i] = corral[i + 1];
     --count;
+    factored = std::min(factored, leaving);
     if (!solve_affine(workspace, count)) return count;
   }
 }
 
 /// Minimum over the affine hull of the corral's first `count` examples, in workspace.affine: with the first as origin,
-/// Cholesky of the Gram matrix of the differences. False where they are affinely dependent to rounding.
+/// Cholesky of the Gram matrix of the differences, which is made as far as it is not there yet.
+/// False where they are affinely dependent to rounding.
 bool ExampleWeights::solve_affine(Workspace& workspace, int count) const noexcept {
-  auto& [load, affine, slopes, system, corral, state] = workspace;
+  auto& [load, affine, slopes, system, forward, factored, corral, state] = workspace;
   const int origin = corral[0];
   const auto difference_gram = [&](int i, int j) {
     return gram_(i, j) - gram_(i, origin) - gram_(origin, j) + gram_(origin, origin);
   };
-  for (int i = 1; i < count; ++i) {
+  factored = std::max(factored, 1);
+  for (int i = factored; i < count; ++i) {
     const int row = corral[i];
     double right = (load[row] - gram_(row, origin)) - (load[origin] - gram_(origin, origin));
     for (int j = 1; j <= i; ++j) {
@@ -179,16 +184,18 @@ bool ExampleWeights::solve_affine(Workspace& workspace, int count) const noexcep
       for (int k = 1; k < j; ++k) entry -= system(i, k) * system(j, k);
       if (j < i) {
         system(i, j) = entry / system(j, j);
-        right -= system(i, j) * affine[j];
+        right -= system(i, j) * forward[j];
       } else {
         if (!(entry > kDependent * gram_.diagonal().maxCoeff())) return false;
         system(i, i) = std::sqrt(entry);
       }
     }
-    affine[i] = right / system(i, i);
+    forward[i] = right / system(i, i);
+    factored = i + 1;
   }
   affine[0] = 1;
   for (int i = count - 1; i > 0; --i) {
+    affine[i] = forward[i];
     for (int k = i + 1; k < count; ++k) affine[i] -= system(k, i) * affine[k];
     affine[i] /= system(i, i);
     affine[0] -= affine[i];

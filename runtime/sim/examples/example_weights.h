@@ -17,7 +17,9 @@ class ExampleWeights {
   struct Workspace {
     Eigen::VectorXd load;            ///< padded(K)
     Eigen::VectorXd affine, slopes;  ///< K each
-    Eigen::MatrixXd system;          ///< K x K
+    Eigen::MatrixXd system;          ///< K x K, Cholesky factor of the corral
+    Eigen::VectorXd forward;         ///< K, of its right side
+    int factored = 0;                ///< examples of the corral, from the first on, whose rows it has
     Eigen::VectorXi corral;          ///< affinely independent examples of positive weight, the first ones used
     Eigen::VectorXi state;           ///< K: whether each example is out, in the corral or refused
   };

@@ -5,12 +5,18 @@
 namespace exmat::runtime {
 
 TargetTable::TargetTable(const TargetTableData& data)
-    : basis_(static_cast<int>(data.degree), static_cast<int>(data.exponents.cols())),
-      lower_basis_(basis_.degree() - 1, basis_.weights()),
+    : degree_(static_cast<int>(data.degree)),
+      examples_(data.exponents.cols()),
       modes_(data.control_points.cols()),
-      knots_(data.knots),
-      control_points_(data.control_points.rows() * padded(modes_)),
-      raised_(lower_basis_.size(), basis_.weights()) {
+      knots_(data.knots) {
+  if (exmat::is_of_pairs(data)) {
+    pairs_.emplace(data);
+    return;
+  }
+  basis_ = BernsteinBasis(degree_, static_cast<int>(examples_));
+  lower_basis_ = BernsteinBasis(degree_ - 1, basis_.weights());
+  control_points_ = AlignedArray(data.control_points.rows() * padded(modes_));
+  raised_.resize(lower_basis_.size(), basis_.weights());
   Eigen::Map<RowMatrix>(control_points_.data(), data.control_points.rows(), padded(modes_)).leftCols(modes_) =
       data.control_points;
   const IndexMatrix lower = lower_basis_.exponents();
@@ -21,12 +27,18 @@ TargetTable::TargetTable(const TargetTableData& data)
 }
 
 TargetTable::Workspace TargetTable::make_workspace() const {
+  if (pairs_) {
+    Workspace workspace;
+    workspace.pairs = pairs_->make_workspace();
+    return workspace;
+  }
   return {basis_.make_workspace(),
           lower_basis_.make_workspace(),
           Eigen::VectorXd::Zero(basis_.size()),
           Eigen::VectorXd::Zero(lower_basis_.size()),
           AlignedArray(modes_),
-          Eigen::VectorXd::Zero(basis_.weights())};
+          Eigen::VectorXd::Zero(basis_.weights()),
+          {}};
 }
 
 Eigen::Index TargetTable::piece(const Eigen::VectorXd& weights) const noexcept {
@@ -53,6 +65,10 @@ void TargetTable::combine(Eigen::Index piece, Workspace& workspace) const noexce
 
 void TargetTable::evaluate(const Eigen::VectorXd& weights, Workspace& workspace,
                            Eigen::VectorXd& target) const noexcept {
+  if (pairs_) {
+    pairs_->evaluate(weights, workspace.pairs, target);
+    return;
+  }
   const Eigen::Index piece = locate(weights, workspace.local);
   basis_.values(workspace.local, workspace.basis, workspace.values);
   combine(piece, workspace);
@@ -71,8 +87,8 @@ void TargetTable::evaluate_lanes(const double* weights, double* scratch, double*
 
 // dp/dw_k = D sum_b B_b(w) P_(b + 1_k) for independent weights, which along w itself gives D p. In a piece those are
 // its own weights; the difference of the two columns is dp/ds = (t_i+1 - t_i) dp/dt.
-void TargetTable::derivative(const Eigen::VectorXd& weights, Workspace& workspace,
-                             Eigen::MatrixXd& jacobian) const noexcept {
+void TargetTable::differentiate(const Eigen::VectorXd& weights, Workspace& workspace,
+                                Eigen::MatrixXd& jacobian) const noexcept {
   const Eigen::Index piece = locate(weights, workspace.local);
   lower_basis_.values(workspace.local, workspace.lower_basis, workspace.lower_values);
   for (Eigen::Index k = 0; k < examples(); ++k) {
@@ -85,7 +101,15 @@ void TargetTable::derivative(const Eigen::VectorXd& weights, Workspace& workspac
     jacobian.col(1) = (jacobian.col(1) - jacobian.col(0)) / (knots_[piece + 1] - knots_[piece]);
     jacobian.col(0).setZero();
   }
-  Eigen::Map<Eigen::VectorXd> along(workspace.sum.data(), modes_);
+}
+
+void TargetTable::derivative(const Eigen::VectorXd& weights, Workspace& workspace,
+                             Eigen::MatrixXd& jacobian) const noexcept {
+  if (pairs_)
+    pairs_->derivative(weights, workspace.pairs, jacobian);
+  else
+    differentiate(weights, workspace, jacobian);
+  Eigen::Map<Eigen::VectorXd> along((pairs_ ? workspace.pairs.sum : workspace.sum).data(), modes_);
   along.noalias() = jacobian * weights;
   jacobian.colwise() -= along;
 }

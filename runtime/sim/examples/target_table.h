@@ -1,15 +1,18 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 #include "common/model/reduced_model.h"
 #include "runtime/kernels/aligned_array.h"
 #include "runtime/sim/examples/bernstein_basis.h"
+#include "runtime/sim/examples/pair_table.h"
 
 namespace exmat::runtime {
 
 /// The targets p*(w) of K >= 2 examples from a table, exact at the examples: one polynomial on the simplex of weights,
-/// so infinitely smooth, or for K = 2 several pieces, continuous with their slopes. docs/method.md, "Table of targets".
+/// so infinitely smooth, or for K = 2 several pieces, continuous with their slopes; of many examples terms of one and
+/// two of them. docs/method.md, "Table of targets".
 /// Immutable; no evaluation allocates or throws.
 class TargetTable {
  public:
@@ -19,6 +22,7 @@ class TargetTable {
     Eigen::VectorXd lower_values;                  ///< as many as polynomials of degree D - 1
     AlignedArray sum;                              ///< r, padded
     Eigen::VectorXd local;                         ///< K, weights within the piece
+    PairTable::Workspace pairs;
   };
 
   TargetTable() = default;
@@ -28,10 +32,12 @@ class TargetTable {
 
   Workspace make_workspace() const;
 
-  int degree() const { return basis_.degree(); }
-  Eigen::Index examples() const { return basis_.weights(); }  ///< K
-  Eigen::Index modes() const { return modes_; }               ///< r
-  Eigen::Index pieces() const { return knots_.size() - 1; }   ///< P
+  int degree() const { return degree_; }                     ///< that of the largest term
+  Eigen::Index examples() const { return examples_; }        ///< K
+  Eigen::Index modes() const { return modes_; }              ///< r
+  Eigen::Index pieces() const { return knots_.size() - 1; }  ///< P
+  bool is_of_pairs() const { return pairs_.has_value(); }
+  Eigen::Index piece_rows() const { return pairs_ ? pairs_->rows() : basis_.size(); }  ///< control points of a piece
 
   /// The piece in [0, P) that serves these weights [K]; that which begins there at a knot.
   Eigen::Index piece(const Eigen::VectorXd& weights) const noexcept;
@@ -39,7 +45,7 @@ class TargetTable {
   /// `target` [r] = p*(w) in reduced coordinates; weights [K] >= 0 add up to 1.
   void evaluate(const Eigen::VectorXd& weights, Workspace& workspace, Eigen::VectorXd& target) const noexcept;
 
-  /// Evaluates kLanes bodies side by side (kernels.h): weights [K] and target [r] of each, for tables of one piece;
+  /// Evaluates kLanes bodies side by side (kernels.h): weights [K] and target [r] of each, for one polynomial;
   /// scratch lanes_scratch().
   void evaluate_lanes(const double* weights, double* scratch, double* target) const noexcept;
   Eigen::Index lanes_scratch() const noexcept;
@@ -51,7 +57,11 @@ class TargetTable {
  private:
   Eigen::Index locate(const Eigen::VectorXd& weights, Eigen::VectorXd& local) const noexcept;
   void combine(Eigen::Index piece, Workspace& workspace) const noexcept;
+  void differentiate(const Eigen::VectorXd& weights, Workspace& workspace, Eigen::MatrixXd& jacobian) const noexcept;
 
+  int degree_ = 0;
+  Eigen::Index examples_ = 0;           ///< K
+  std::optional<PairTable> pairs_;      ///< in place of what follows but modes and knots
   BernsteinBasis basis_, lower_basis_;  ///< degree D and D - 1
   Eigen::Index modes_ = 0;              ///< r
   Eigen::VectorXd knots_;               ///< P + 1

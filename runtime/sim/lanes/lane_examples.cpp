@@ -10,7 +10,7 @@ LaneExamples::LaneExamples(const ExampleModel& model)
   filter_ = AlignedArray(lane_triangle(modes) / kLanes);
   for (Eigen::Index i = 0; i < modes; ++i)
     for (Eigen::Index j = 0; j <= i; ++j) filter_[lane_entry(i, j) / kLanes] = filter(j, i);
-  if (model.weights.has_candidates() && model.table && model.table->pieces() == 1)
+  if (model.weights.has_candidates() && model.table && model.table->pieces() == 1 && !model.table->is_of_pairs())
     scratch_ = AlignedArray(model.table->lanes_scratch());
 }
 

@@ -58,14 +58,19 @@ TEST_P(BadBundleIs, ReportedByTheValidator) {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+void set_exponents(Spoiler& spoiler, const std::vector<std::int32_t>& values) {
+  for (std::size_t i = 0; i < values.size(); ++i)
+    spoiler.set("/targets/exponents", static_cast<Eigen::Index>(i), values[i]);
+}
+
 const BadBundle kBadBundles[] = {
     {"OtherFormat", [](Spoiler& s) { s.set_text("/", "format", "other"); },
      "/@format: expected \"exmat-bundle\", found \"other\""},
     {"NoFormat", [](Spoiler& s) { s.remove_attribute("/", "format"); }, "/@format: expected an attribute, found none"},
-    {"NewerVersion", [](Spoiler& s) { s.set_integer("/", "format_version", 16); },
-     "/@format_version: expected 15, found 16; a version of exmat that is newer wrote this bundle; make it again"},
+    {"NewerVersion", [](Spoiler& s) { s.set_integer("/", "format_version", 17); },
+     "/@format_version: expected 16, found 17; a version of exmat that is newer wrote this bundle; make it again"},
     {"OlderVersion", [](Spoiler& s) { s.set_integer("/", "format_version", 8); },
-     "/@format_version: expected 15, found 8; a version of exmat that is older wrote this bundle; make it again"},
+     "/@format_version: expected 16, found 8; a version of exmat that is older wrote this bundle; make it again"},
     {"NoVersion", [](Spoiler& s) { s.set_integer("/", "format_version", 0); },
      "/@format_version: expected a number > 0, found 0"},
     {"TextVersion", [](Spoiler& s) { s.set_text("/", "format_version", "1"); },
@@ -244,6 +249,29 @@ const BadBundle kBadBundles[] = {
      "/targets/exponents: expected 3 0 0 in row 0, for degree 3, found 2 0 0"},
     {"ExponentsOutOfOrder", [](Spoiler& s) { s.set("/targets/exponents", 14, std::int32_t{2}); },
      "/targets/exponents: expected 0 1 1 in row 4, for degree 2, found 0 1 2"},
+    {"TermBeyondTheDegree",
+     [](Spoiler& s) {
+       set_exponents(s, {0, 0, 0, 1, 1, 0, 0, 2, 0, 1, 0, 1, 0, 0, 2, 0, 1, 2});
+     },
+     "/targets/exponents: expected one or two examples behind those of the row before, to at most 2, in row 5, found "
+     "0 1 2"},
+    {"TermWithoutItsLastRow",
+     [](Spoiler& s) {
+       set_exponents(s, {0, 0, 0, 1, 1, 0, 0, 2, 0, 1, 0, 1, 0, 1, 1, 0, 1, 1});
+     },
+     "/targets/exponents: expected 0 0 2 in row 4, found 0 1 1"},
+    {"TermTwice",
+     [](Spoiler& s) {
+       set_exponents(s, {0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 1, 1, 0, 1, 1, 0, 1, 1});
+     },
+     "/targets/exponents: expected one or two examples behind those of the row before, to at most 2, in row 4, found "
+     "0 1 1"},
+    {"TermOfNoExample",
+     [](Spoiler& s) {
+       set_exponents(s, {0, 0, 0, 2, 0, 0, 0, 2, 0, 1, 0, 1, 0, 0, 2, 0, 1, 1});
+     },
+     "/targets/exponents: expected one or two examples behind those of the row before, to at most 2, in row 1, found "
+     "2 0 0"},
     {"IndexTwice", [](Spoiler& s) { s.set_integer("/examples/bend", "index", 2); },
      "/examples/twist \xc3\xa9@index: expected another index for each example, found 2, that of bend too"},
     {"IndexBeyondCount", [](Spoiler& s) { s.set_integer("/examples/bend", "index", 3); },

@@ -65,5 +65,17 @@ TEST(SpreadPoints, LeaveNoGapOnAnEdge) {
   for (std::size_t i = 1; i < sorted.size(); ++i) EXPECT_LE(sorted[i] - sorted[i - 1], 3.0 / 64);
 }
 
+TEST(SomeTogether, HaveSoManyOfAllCoordinates) {
+  const RowMatrix points = some_together(9, 3, 200, 5);
+  ASSERT_EQ(points.rows(), 200);
+  EXPECT_EQ(points, some_together(9, 3, 200, 5));
+  EXPECT_LE((points.rowwise().sum().array() - 1).abs().maxCoeff(), 1e-15);
+  for (const auto& row : points.rowwise()) EXPECT_EQ((row.tail(8).array() > 0).count(), 3);
+  const auto with_first = (points.col(0).array() > 0).count();
+  EXPECT_GT(with_first, 70);  // of 200 halves, four deviations at least
+  EXPECT_LT(with_first, 130);
+  EXPECT_GT((points.array() > 0).colwise().count().tail(8).minCoeff(), 40);  // of 75 each
+}
+
 }  // namespace
 }  // namespace exmat::precompute

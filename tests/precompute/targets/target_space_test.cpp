@@ -120,7 +120,8 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{2, EnergyReference::kExample, MaterialModel::kStVenantKirchhoff, true}));
 
 // The table is as near as it says, for the targets of the whole mesh; the tolerance is the asset's default. The kinds
-// of random weights are many more than the checks', so that a little more may turn up between these: a tenth.
+// of random weights are many more than the checks', so that a little more may turn up between these: a tenth, of more
+// than four examples four tenths. Of these the tolerance is a hundred times that, and of two at once.
 TEST_P(TargetSpaceOf, TableIsNearTheTargetsOfTheWholeMesh) { expect_near(body_.build(kTolerance)); }
 
 // Half of the tets alone give targets that are off by a tenth.
@@ -148,11 +149,8 @@ TEST_P(TargetSpaceOf, ForcesOfTetsAreTheDerivativeOfTheirEnergies) {
 }
 
 void TargetSpaceOf::expect_near(const TargetSpace& space) const {
-  const double tolerance = kTolerance;
-  if (GetParam().examples > 4) {
-    EXPECT_FALSE(space.table);
-    return;
-  }
+  const bool many = GetParam().examples > 4;
+  const double tolerance = (many ? 100 : 1) * kTolerance, between = many ? 1.4 : 1.1;
   ASSERT_TRUE(space.table) << space.table_message;
   const runtime::TargetTable table(*space.table);
   auto workspace = table.make_workspace();
@@ -160,8 +158,8 @@ void TargetSpaceOf::expect_near(const TargetSpace& space) const {
   for (const Eigen::VectorXd& w : random_weights(GetParam().examples, 40)) {
     table.evaluate(w, workspace, y);
     const double distance = body_.energy_norm(space.coordinates.basis * y - body_.target(w)) / body_.scale();
-    EXPECT_LE(distance, 1.1 * space.table->error) << w.transpose();
-    EXPECT_LE(distance, 1.1 * tolerance) << w.transpose();
+    EXPECT_LE(distance, between * space.table->error) << w.transpose();
+    if (!many || (w.tail(w.size() - 1).array() > 0).count() <= 2) EXPECT_LE(distance, 1.1 * tolerance) << w.transpose();
   }
 }
 
@@ -181,8 +179,8 @@ TEST_P(TargetSpaceOf, ElementsGiveTheTargetsOfTheWholeMesh) {
     const double distance =
         body_.energy_norm(space.coordinates.basis * (solver.basis() * y) - body_.target(w)) / body_.scale();
     // Twice what a few held-out weights showed.
-    EXPECT_LE(distance, 2 * space.elements.heldout_error + 1e-4) << w.transpose();
-    EXPECT_LE(distance, 5e-3) << w.transpose();
+    EXPECT_LE(distance, 2 * (space.elements.heldout_error + space.error) + 1e-4) << w.transpose();
+    EXPECT_LE(distance, GetParam().examples > 4 ? 1e-2 : 5e-3) << w.transpose();
   }
 }
 

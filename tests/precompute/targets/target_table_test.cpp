@@ -418,13 +418,85 @@ TEST(TargetTableRefusal, WhereTheDegreeIsNotEnough) {
     EXPECT_NE(report.message.find(part), std::string::npos) << report.message;
 }
 
-TEST(TargetTableRefusal, OfTooFewAndTooManyExamples) {
-  for (const int examples : {1, 5}) {
-    TargetTableReport report;
-    EXPECT_FALSE(table_of(small_model(examples, 0.5), {}, report));
-    EXPECT_NE(report.message.find("no table of targets"), std::string::npos);
-    EXPECT_EQ(report.solves, 0);
+TEST(TargetTableRefusal, OfTooFewExamples) {
+  TargetTableReport report;
+  EXPECT_FALSE(table_of(small_model(1, 0.5), {}, report));
+  EXPECT_NE(report.message.find("no table of targets"), std::string::npos);
+  EXPECT_EQ(report.solves, 0);
+}
+
+class TargetsOfManyExamples : public ::testing::TestWithParam<EnergyReference> {
+ protected:
+  static constexpr int kExamples = 7;
+  static constexpr double kTolerance = 2e-3;
+
+  TargetsOfManyExamples() : model_(small_model(kExamples, 0.4)), solver_(solver_of(model_, GetParam())) {}
+
+  TargetTableData build() {
+    const auto data = table_of(model_, {.tolerance = kTolerance, .energy_reference = GetParam()}, report_);
+    EXPECT_TRUE(data) << report_.message;
+    return data.value_or(TargetTableData{});
   }
+  /// Largest over weights of which `together` are not of the rest pose.
+  double error(const TargetTableData& data, int together) const {
+    const TargetTable table(data);
+    auto workspace = table.make_workspace();
+    const Eigen::HouseholderQR<Eigen::MatrixXd> basis(solver_.basis());
+    Eigen::VectorXd target(table.modes());
+    double largest = 0;
+    for (const Eigen::VectorXd& w : random_weights(kExamples, 4)) {
+      if ((w.tail(kExamples - 1).array() > 0).count() != together) continue;
+      table.evaluate(w, workspace, target);
+      largest = std::max(largest, (basis.solve(target) - solve(solver_, w)).norm());
+    }
+    return largest / largest_example(solver_, kExamples);
+  }
+
+  ReducedModel model_;
+  TargetSolver solver_;
+  TargetTableReport report_;
+};
+INSTANTIATE_TEST_SUITE_P(References, TargetsOfManyExamples,
+                         ::testing::Values(EnergyReference::kExample, EnergyReference::kRest),
+                         [](const auto& test) { return std::string(name_of(test.param)); });
+
+// Newton's method at weights that the table has not seen. What more than two examples do to each other is not within
+// the tolerance, but within what the table says, as far as maxima over different samples of a function agree.
+TEST_P(TargetsOfManyExamples, AreThoseThatAreSolvedFor) {
+  const TargetTableData data = build();
+  EXPECT_TRUE(is_of_pairs(data));
+  EXPECT_LE(error(data, 1), kTolerance);
+  EXPECT_LE(error(data, 2), kTolerance);
+  for (const int together : {3, 4, 6}) EXPECT_LE(error(data, together), 1.4 * data.error) << together;
+}
+
+TEST_P(TargetsOfManyExamples, AreTheExamplesWhereOneHasAllOfTheWeight) {
+  const TargetTable table(build());
+  auto workspace = table.make_workspace();
+  Eigen::VectorXd target(table.modes());
+  for (int k = 0; k < kExamples; ++k) {
+    table.evaluate(Eigen::VectorXd::Unit(kExamples, k), workspace, target);
+    const Eigen::VectorXd& pose = model_.examples->examples[static_cast<std::size_t>(k)].pose;
+    EXPECT_LE((target - pose).norm(), 1e-12 * (1 + pose.norm())) << k;
+  }
+}
+
+TEST_P(TargetsOfManyExamples, AreTheSameInEveryRunAndForAnyNumberOfThreads) {
+  const int before = omp_get_max_threads();
+  omp_set_num_threads(1);
+  const TargetTableData one = build();
+  omp_set_num_threads(3);
+  EXPECT_TRUE(identical(one, build()));
+  omp_set_num_threads(before);
+}
+
+// Within nine tenths of the largest example all of these are.
+TEST_P(TargetsOfManyExamples, HaveNoTermOfPairsThatAreTheSumOfTheTwo) {
+  const auto loose = table_of(model_, {.tolerance = 0.9, .energy_reference = GetParam()}, report_);
+  ASSERT_TRUE(loose);
+  EXPECT_LE(loose->control_points.rows(), build().control_points.rows());
+  for (Eigen::Index n = 0; n < loose->exponents.rows(); ++n)
+    EXPECT_LE((loose->exponents.row(n).tail(kExamples - 1).array() > 0).count(), 1);
 }
 
 // One polynomial of three examples, and pieces of two.
@@ -457,6 +529,29 @@ TEST(ShiftedTargets, AreFartherByALinearFunctionOfTheWeights) {
       after.evaluate(w, workspace, there);
       EXPECT_LE((there - at - shifts * w).norm(), 1e-14 * (at.norm() + there.norm() + 1));
     }
+  }
+}
+
+// Terms of one and two examples.
+TEST(ShiftedTargets, OfManyExamplesAreFartherByALinearFunctionOfTheWeights) {
+  TargetTableData data;
+  data.degree = 3;
+  data.exponents.resize(7, 5);
+  data.exponents << 0, 0, 0, 0, 0,                                                //
+      1, 1, 0, 0, 0, 0, 2, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1,  //
+      0, 1, 0, 1, 0;
+  const Eigen::Index modes = 4;
+  data.control_points = RowMatrix::Random(7, modes);
+  const Eigen::MatrixXd shifts = Eigen::MatrixXd::Random(modes, 5);
+  TargetTableData shifted = data;
+  shift_targets(shifts, shifted);
+  const TargetTable before(data), after(shifted);
+  auto workspace = before.make_workspace();
+  Eigen::VectorXd at(modes), there(modes);
+  for (const Eigen::VectorXd& w : random_weights(5, 5)) {
+    before.evaluate(w, workspace, at);
+    after.evaluate(w, workspace, there);
+    EXPECT_LE((there - at - shifts * w).norm(), 1e-14 * (at.norm() + there.norm() + 1));
   }
 }
 
