@@ -15,6 +15,15 @@
 namespace exmat::runtime {
 namespace {
 
+constexpr std::size_t kListed = 6;  // vertices in a message
+
+/// The first few of them.
+std::string list_of(const std::vector<std::int32_t>& vertices) {
+  const auto shown = std::min<std::size_t>(vertices.size(), kListed);
+  return fmt::format("{}{}", fmt::join(vertices.begin(), vertices.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
+                     shown < vertices.size() ? ", ..." : "");
+}
+
 /// Reason why the k-th vertex cannot be held; none where it can.
 std::optional<HoldFault> fault_of(const FullModel* full, bool in_modes, const Patch& patch, std::size_t k,
                                   const State& state) {
@@ -130,10 +139,13 @@ std::optional<HoldFault> hold_together(const End& own, const End& other, int bod
   attachment.rotation.setIdentity();
   attachment.position.setZero();
   attachment.patch = take_hold_in_modes(own.model, own.patch, own.state, is_fixed, attachment);
-  for (const ReducedPatch* const patch : {&attachment.patch, &held.patch})
-    if (is_fixed && patch->axes.cols() < 3)
-      return HoldFault{patch == &held.patch ? "to/vertices" : "vertices",
-                       "three vertices or more that are not in a line, or kind ball or spring", "others"};
+  for (const End* const end : {&own, &other}) {
+    const bool is_own = end == &own;
+    if (is_fixed && (is_own ? attachment.patch : held.patch).axes.cols() < 3)
+      return HoldFault{is_own ? "vertices" : "to/vertices",
+                       "three vertices or more that are not in a line, or kind ball or spring",
+                       fmt::format("{} in a line: {}", end->patch.vertices.size(), list_of(end->patch.vertices))};
+  }
   const BodyPose own_pose = pose_of(own.model, own.state), other_pose = pose_of(other.model, other.state);
   PatchPlace there;
   place_patch(held.patch, other_pose, there);

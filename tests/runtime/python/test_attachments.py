@@ -218,6 +218,22 @@ def test_bodies_are_tied_to_each_other(free_bundle):
     world.remove(0)
 
 
+def test_patches_in_a_line_are_named(free_bundle):
+    model = exmat.Model(free_bundle, use_contact=True)
+    world, bodies = exmat.World(), [exmat.Body(model), exmat.Body(model)]
+    for body in bodies:
+        world.add(body)
+    with pytest.raises(exmat.InvalidArgument, match="to/vertices: 2 in a line: 0, 1"):
+        bodies[0].attach_to(end_of(model)[0], bodies[1], [0, 1], kind="fixed")
+
+
+def test_frames_have_a_rotation(free_bundle):
+    body = exmat.Body(exmat.Model(free_bundle))
+    for turn, determinant in ((np.zeros((3, 3)), "0"), (np.diag([1, 1, -1]), "-1"), (np.diag([1, 1, 0]), "0")):
+        with pytest.raises(exmat.InvalidArgument, match=f"frame 0: .* determinant {determinant}: expected a rotation"):
+            body.attach([0, 1, 2], np.column_stack([turn, [0, 0, 0]]))
+
+
 def test_bodies_that_touch_obstacles_alone_are_not_tied(free_bundle):
     body = exmat.Body(exmat.Model(free_bundle))
     with pytest.raises(exmat.InvalidArgument, match="same world"):
