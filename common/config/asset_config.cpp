@@ -48,11 +48,20 @@ class AssetReader {
     if (contact.contains("vertices")) asset.contact_vertices = read_selection(contact["vertices"], "/contact/vertices");
     asset.contact_count = optional_member<int>(contact, "count");
     asset.needs = optional_member<std::vector<std::string>>(json, "needs");
+    if (asset.clamp_follows && asset.needs) check_needs_of_followers(*asset.needs);
     asset.seed = json.value("seed", asset.seed);
     return asset;
   }
 
  private:
+  /// A clamp that follows examples goes by their weights, and their force is linear.
+  void check_needs_of_followers(const std::vector<std::string>& needs) const {
+    if (std::ranges::count(needs, "examples") == 0)
+      refuse("/needs", "\"examples\" among them, which the clamp follows (object.fixed.follow)", "none");
+    if (std::ranges::count(needs, "target_elasticity") > 0)
+      refuse("/needs", "no \"target_elasticity\" beside object.fixed.follow, whose example force is linear", "it");
+  }
+
   void read_object(const Json& json, AssetConfig& asset) const {
     read_object_mesh(json, asset);
     const Json material = member_or(json, "material", Json::object());

@@ -38,6 +38,8 @@ void info_command(const std::filesystem::path& bundle) {
   fmt::print("mesh           {} vertices, {} tets\n", summary.vertices, summary.tets);
   fmt::print("modes          {}\n", summary.modes);
   fmt::print("cubature       {} elements\n", summary.cubature_elements);
+  if (model.skeleton && model.skeleton->shifts.rows() > 0)
+    fmt::print("clamp          follows the examples, by their weights\n");
   if (model.object) fmt::print("material       {}\n", name_of(model.object->materials.model));
   if (model.object && model.object->stiffness_ratio > 0)
     fmt::print("elements       {}, {:.2f} times as stiff as the material, {:.2f} at worst; {:.0f} % one tet thick\n",

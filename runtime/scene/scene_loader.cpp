@@ -262,6 +262,10 @@ std::vector<std::vector<NamedPose>> named_poses(const LoadedScene& loaded) {
 void check_compensation(const SceneConfig& config, const ReducedModel& data) {
   if (!config.examples || !data.targets) return;
   const double stiffness = data.targets->compensated_stiffness;
+  if (config.examples->compensate && data.skeleton)
+    throw InputError({config.file.string(), "/examples/compensate",
+                      "no such member of a body on bones, or whose clamp follows examples", "true",
+                      "its targets are those of its modes, in which it does not step: leave compensate out"});
   if (config.examples->compensate && stiffness == 0)
     throw InputError({config.file.string(), "/examples/compensate", "a bundle that was made for this scene",
                       config.bundle.string() + ", whose targets are not compensated",
@@ -315,7 +319,12 @@ std::unique_ptr<const FullModel> prepare_full_space(const SceneConfig& config, c
 }
 
 void check_full_space(const SceneConfig& config, const LoadedScene& loaded) {
-  if (const char* reason = unsupported(*loaded.full, loaded.scene))
+  const char* const reason = unsupported(*loaded.full, loaded.scene);
+  if (reason != nullptr && loaded.model->skeleton)
+    throw InputError({config.file.string(), config.place.empty() ? "/" : config.place,
+                      "what a body on bones, or whose clamp follows examples, can do, which steps in all its vertices",
+                      reason, "leave it out"});
+  if (reason != nullptr)
     throw InputError({config.file.string(), config.place + "/space",
                       std::string("\"reduced\", where a scene has ") + reason,
                       fmt::format("\"{}\"", name_of(config.space.space)), ""});

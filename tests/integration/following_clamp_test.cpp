@@ -221,7 +221,13 @@ TEST_F(FollowingClamp, RefusesWhatItCannotFollow) {
                         "does, found example twist, a mesh of its own"));
   EXPECT_THAT(refusal({{"object", {{"fixed", {{"follow", true}, {"box", nullptr}}}}}}),
               HasSubstr("/object/fixed: expected exactly one of \"box\", \"color\""));
+  EXPECT_THAT(refusal({{"needs", {"full_space"}}}),
+              HasSubstr("/needs: expected \"examples\" among them, which the clamp follows"));
+  EXPECT_THAT(refusal({{"needs", {"examples", "target_elasticity"}}}),
+              HasSubstr("/needs: expected no \"target_elasticity\" beside object.fixed.follow"));
   ASSERT_EQ(bundle("follows", kStep, true).status, 0);
+  EXPECT_THAT(exmat_runtime({"info", folder_.path("follows.h5")}).output,
+              HasSubstr("clamp          follows the examples"));
   const auto refused_scene = [&](const char* program, const Json& members) {
     Json scene = {{"bundle", "follows.h5"}};
     scene.merge_patch(members);
@@ -233,6 +239,10 @@ TEST_F(FollowingClamp, RefusesWhatItCannotFollow) {
   };
   EXPECT_THAT(refused_scene("full-space", Json::object()), HasSubstr("/bundle: expected the bundle of a body without"));
   EXPECT_THAT(refused_scene("run", {{"examples", {{"stiffness", 1}, {"force", "elastic"}}}}), HasSubstr("elastic"));
+  EXPECT_THAT(refused_scene("run", {{"integrator", "newmark"}}),
+              AllOf(HasSubstr("which steps in all its vertices, found"), Not(HasSubstr("reduced"))));
+  EXPECT_THAT(refused_scene("run", {{"examples", {{"stiffness", 1}, {"compensate", true}}}}),
+              HasSubstr("/examples/compensate: expected no such member of a body on bones"));
   EXPECT_THAT(refused_scene("run", {{"body", {{"motion", {{{"time", 0}}}}}}}), HasSubstr("motion"));
 }
 

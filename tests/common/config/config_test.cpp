@@ -32,7 +32,7 @@ TEST(LoadAsset, FillsInDefaults) {
   EXPECT_EQ(asset.eigenfunctions, 20);
   EXPECT_FALSE(asset.pose_tolerance);
   EXPECT_EQ(asset.formulation, Formulation::kSmoothed);
-  EXPECT_EQ(asset.basis_size, 30);
+  EXPECT_FALSE(asset.basis_size);
   EXPECT_EQ(asset.cubature_method, CubatureMethod::kGreedySwap);
   EXPECT_EQ(asset.target_tolerance, 1e-4);
   EXPECT_EQ(asset.internal_force, ForceMethod::kAuto);

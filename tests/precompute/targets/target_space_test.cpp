@@ -159,7 +159,9 @@ void TargetSpaceOf::expect_near(const TargetSpace& space) const {
     table.evaluate(w, workspace, y);
     const double distance = body_.energy_norm(space.coordinates.basis * y - body_.target(w)) / body_.scale();
     EXPECT_LE(distance, between * space.table->error) << w.transpose();
-    if (!many || (w.tail(w.size() - 1).array() > 0).count() <= 2) EXPECT_LE(distance, 1.1 * tolerance) << w.transpose();
+    if (!many || (w.tail(w.size() - 1).array() > 0).count() <= 2) {
+      EXPECT_LE(distance, 1.1 * tolerance) << w.transpose();
+    }
   }
 }
 

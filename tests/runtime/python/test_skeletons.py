@@ -144,7 +144,7 @@ def test_the_flesh_follows_and_comes_to_rest_as_it_hangs(model):
     body.set_damping(3, 0.02)
     still.set_damping(3, 0.02)
     everywhere = exmat.Points.all_vertices(model)
-    for k in range(700):
+    for k in range(1200):
         body.set_bones(model.animated_bones("curl", min(0.004 * k, 1.0)))
         body.step()
         still.step()

@@ -144,9 +144,10 @@ TEST(PairTable, ExamplesAreTheConstantAndTheLastOfTheirTerm) {
   EXPECT_EQ(evaluate(table, Eigen::VectorXd::Unit(kExamples, 0)), data.control_points.row(0).transpose());
   for (Eigen::Index n = 1; n < data.exponents.rows(); ++n)
     for (Eigen::Index k = 1; k < kExamples; ++k)
-      if (data.exponents(n, k) > 0 && data.exponents(n, k) == data.exponents.row(n).sum())
+      if (data.exponents(n, k) > 0 && data.exponents(n, k) == data.exponents.row(n).sum()) {
         EXPECT_EQ(evaluate(table, Eigen::VectorXd::Unit(kExamples, k)),
                   (data.control_points.row(0) + data.control_points.row(n)).transpose());
+      }
 }
 
 // Central differences of a polynomial of degree 4 between two points of the simplex: their error is step^2 times its
