@@ -68,7 +68,7 @@ std::optional<ValueFault> check_pair_rows(std::int64_t degree, const IndexMatrix
 }  // namespace
 
 std::optional<ValueFault> check_exponent_rows(std::int64_t degree, const IndexMatrix& rows) {
-  if (rows.rows() > 0 && (rows.row(0).array() == 0).all()) return check_pair_rows(degree, rows);
+  if (is_of_pairs(rows)) return check_pair_rows(degree, rows);
   IntegerRow expected = IntegerRow::Zero(rows.cols());
   expected[0] = degree;
   bool more = true;

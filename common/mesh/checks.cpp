@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "common/core/disjoint_sets.h"
 #include "common/core/error.h"
 #include "common/mesh/geometry.h"
 
@@ -187,18 +188,14 @@ void require_distinct_tets(const TetMesh& mesh, const std::string& file, const M
 /// Sets of tets, joined by their faces.
 class TetComponents {
  public:
-  explicit TetComponents(const TetMesh& mesh) : parents_(static_cast<std::size_t>(mesh.tet_count())) {
-    std::iota(parents_.begin(), parents_.end(), 0);
+  explicit TetComponents(const TetMesh& mesh) : sets_(static_cast<std::size_t>(mesh.tet_count())) {
     const auto faces = sorted_faces(mesh);
     for (std::size_t i = 1; i < faces.size(); ++i)
-      if (faces[i].corners == faces[i - 1].corners) join(faces[i].tet, faces[i - 1].tet);
+      if (faces[i].corners == faces[i - 1].corners) sets_.join(faces[i].tet, faces[i - 1].tet);
   }
 
-  /// One tet that stands for all of the component of `tet`, the same for each.
-  std::int32_t find(std::int32_t tet) {
-    while (parent(tet) != tet) tet = parent(tet) = parent(parent(tet));
-    return tet;
-  }
+  /// The first tet of the component of `tet`.
+  std::int32_t find(std::int32_t tet) { return sets_.root(tet); }
 
  private:
   struct Face {
@@ -218,15 +215,7 @@ class TetComponents {
     return faces;
   }
 
-  // The smaller root stays, so that a component is named by its first tet.
-  void join(std::int32_t a, std::int32_t b) {
-    const auto [first, second] = std::minmax({find(a), find(b)});
-    parent(second) = first;
-  }
-
-  std::int32_t& parent(std::int32_t tet) { return parents_[static_cast<std::size_t>(tet)]; }
-
-  std::vector<std::int32_t> parents_;
+  DisjointSets sets_;
 };
 
 /// For each tet the first tet of its component.

@@ -134,9 +134,9 @@ struct TargetTableData {
   Eigen::Vector3d compensated_gravity = Eigen::Vector3d::Zero();
 };
 
-/// Whether a table is the sum of terms of one and two examples.
-inline bool is_of_pairs(const TargetTableData& table) {
-  return table.exponents.rows() > 0 && (table.exponents.row(0).array() == 0).all();
+/// True of the exponents of a table that is the sum of terms of one and two examples.
+inline bool is_of_pairs(const IndexMatrix& exponents) {
+  return exponents.rows() > 0 && (exponents.row(0).array() == 0).all();
 }
 
 /// Group /target_space: the same targets to be solved for, in d displacements of their own that hold them all.

@@ -6,10 +6,10 @@
 #include <fmt/format.h>
 #include <map>
 #include <numbers>
-#include <numeric>
 #include <utility>
 #include <vector>
 
+#include "common/core/disjoint_sets.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
 #include "common/mesh/checks.h"
@@ -109,18 +109,12 @@ std::pair<double, double> dihedral_angles(const TetMesh& mesh) {
 bool is_connected(const SurfaceMesh& surface) {
   TriangleArray triangles = surface.triangles;
   weld(surface.vertices, triangles);
-  std::vector<std::int32_t> parents(static_cast<std::size_t>(surface.vertices.rows()));
-  std::iota(parents.begin(), parents.end(), 0);
-  const auto root = [&](std::int32_t vertex) {
-    while (parents[static_cast<std::size_t>(vertex)] != vertex)
-      vertex = parents[static_cast<std::size_t>(vertex)] =
-          parents[static_cast<std::size_t>(parents[static_cast<std::size_t>(vertex)])];
-    return vertex;
-  };
+  DisjointSets parts(static_cast<std::size_t>(surface.vertices.rows()));
   for (const auto& corners : triangles.rowwise())
-    for (const int corner : {1, 2}) parents[static_cast<std::size_t>(root(corners[corner]))] = root(corners[0]);
-  const std::int32_t first = root(triangles(0, 0));
-  return std::ranges::all_of(triangles.rowwise(), [&](const auto& corners) { return root(corners[0]) == first; });
+    for (const int corner : {1, 2}) parts.join(corners[0], corners[corner]);
+  return std::ranges::all_of(triangles.rowwise(), [&, first = parts.root(triangles(0, 0))](const auto& corners) {
+    return parts.root(corners[0]) == first;
+  });
 }
 
 // Every edge has a triangle on either side.
@@ -141,7 +135,7 @@ class CageMaker {
 
   /// About so many tets; `size` becomes that of their cells.
   TetMesh of_count(int cells, double& size) const;
-  /// `offset`: what the first trial has; becomes that of the cage, over the size.
+  /// `offset`, over the size, is that of the first trial and becomes that of the cage.
   TetMesh shape(double size, double& offset) const;
 
  private:
@@ -212,15 +206,15 @@ bool CageMaker::draw_out(TetMesh& mesh) const {
   return false;
 }
 
-// What keeps the mesh from being a cage, if anything does; draws it out over the surface.
+// Draws the mesh out over the surface, and says what keeps it from being a cage, if anything does.
 std::string CageMaker::fault_of(TetMesh& mesh) const {
   if (!draw_out(mesh)) return "vertices of the surface outside";
   const double angle = tet_volumes(mesh).minCoeff() > 0 ? dihedral_angles(mesh).first : 0;
   if (angle < kLeastDihedralAngle) return fmt::format("a dihedral angle of {:.1f} degrees", angle);
+  if (!connected_) return "";
   TetMesh copy = mesh;
-  if (connected_ && check_mesh(copy, name_, {.drop_smaller_components = true}).dropped_components > 0)
-    return "several components";
-  return "";
+  const bool falls_apart = check_mesh(copy, name_, {.drop_smaller_components = true}).dropped_components > 0;
+  return falls_apart ? "several components" : "";
 }
 
 TetMesh CageMaker::shape(double size, double& offset) const {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "common/config/asset_config.h"
 #include "common/core/error.h"
@@ -72,14 +73,13 @@ void require_modes(Eigen::Index found, int size) {
                     std::to_string(size), "ask for fewer, or for more basis.linear_modes"});
 }
 
-// The components that are asked for in the complement of the basis so far.
-void fill_up(const BasisInput& input, int size, Eigen::MatrixXd& basis) {
-  const auto& mass = input.system.mass;
-  Eigen::MatrixXd snapshots = scaled_snapshots(input);
-  remove_components(mass, basis, snapshots);
-  const Eigen::MatrixXd components = principal_components(mass, snapshots, size - basis.cols());
-  require_modes(basis.cols() + components.cols(), size);
+// Fills the basis up to so many with the principal components of the columns, in its complement and the `norm` product.
+void fill_up(const SparseMatrix& mass, const SparseMatrix& norm, Eigen::MatrixXd columns, int size,
+             Eigen::MatrixXd& basis) {
+  remove_components(mass, basis, columns);
   const Eigen::Index before = basis.cols();
+  const Eigen::MatrixXd components = principal_components(norm, columns, size - before);
+  require_modes(before + components.cols(), size);
   basis.conservativeResize(Eigen::NoChange, size);
   basis.rightCols(size - before) = components;
 }
@@ -99,7 +99,7 @@ Eigen::MatrixXd unit_fields(const ElasticSystem& system, Eigen::MatrixXd fields)
   return fields;
 }
 
-// Of a basis, that example fields may take.
+// Example fields may take as many modes of a basis.
 Eigen::Index most_fields(int size) { return std::max({1, size / 2, size - kBasisSize / 2}); }
 
 // All of the columns have unit norm together.
@@ -123,10 +123,9 @@ int basis_size_for(const ElasticSystem& system, const Eigen::MatrixXd& fields) {
 Eigen::MatrixXd modal_basis(const BasisInput& input, int size) {
   const auto& mass = input.system.mass;
   Eigen::MatrixXd basis(mass.rows(), 0);
-  if (input.example_fields.cols() > 0) {
+  if (input.example_fields.cols() > 0)
     basis = principal_components(mass, unit_fields(input.system, input.example_fields), most_fields(size));
-  }
-  fill_up(input, size, basis);
+  fill_up(mass, mass, scaled_snapshots(input), size, basis);
   finish(input, basis);
   return basis;
 }
@@ -146,15 +145,9 @@ Eigen::MatrixXd trained_basis(const BasisInput& input, const Eigen::MatrixXd& sn
   columns << of_unit_norm(norm, snapshots), (general ? 1 : kUnseenShare) * modal;
   remove_components(system.mass, system.null_space, columns);
   Eigen::MatrixXd basis(columns.rows(), 0);
-  if (input.example_fields.cols() > most_fields(kBasisSize)) {  // more than runs of a few loads show
+  if (input.example_fields.cols() > most_fields(kBasisSize))  // more than runs of a few loads show
     basis = principal_components(system.mass, unit_fields(system, input.example_fields), most_fields(size));
-    remove_components(system.mass, basis, columns);
-  }
-  const Eigen::Index before = basis.cols();
-  const Eigen::MatrixXd components = principal_components(norm, columns, size - before);
-  require_modes(before + components.cols(), size);
-  basis.conservativeResize(Eigen::NoChange, size);
-  basis.rightCols(size - before) = components;
+  fill_up(system.mass, norm, std::move(columns), size, basis);
   orthonormalise(system.mass, basis);
   finish(input, basis);
   return basis;

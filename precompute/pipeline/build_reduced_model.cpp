@@ -457,10 +457,7 @@ void Pipeline::read() {
                                                           .surface = asset_.object_mesh.string()});
     scene_ = &*own_scene_;
   }
-  if (object_.skeleton && scene_ != nullptr && scene_->examples && scene_->examples->compensate)
-    throw InputError({scene_->file.string(), scene_->place + "/examples/compensate",
-                      "no such member of a body on bones, or whose clamp follows examples", "true",
-                      "its targets are those of its modes, in which it does not step: leave compensate out"});
+  if (object_.skeleton && scene_ != nullptr) require_uncompensated(*scene_);
   warn_of_size(object_, asset_.object_mesh.string(), report_.warnings);
   std::ranges::copy(object_.warnings, std::back_inserter(report_.warnings));
   require_regions(asset_, needs_);

@@ -99,7 +99,7 @@ double PoseSolver::energy(const VertexArray& x, double stiffness) const {
   return elasticity_.energy(displacements(x)) + stiffness * springs_.energy(x);
 }
 
-// Where no tet is inside out at x, none is at the end.
+// No tet is inside out at the end where none is at x.
 void PoseSolver::minimise(VertexArray& x, double stiffness, double end) {
   const double guard = is_sound(x) ? kGuard * std::sqrt(stiffness) : 0;
   Eigen::VectorXd force, step;
@@ -135,7 +135,7 @@ void PoseSolver::minimise(VertexArray& x, double stiffness, double end) {
     ++iterations_;
     if (!(there < here)) return;
     x = trial;
-    // What the guard shortens says little; the whole step would gain half the slope.
+    // A step that the guard shortens says little; the whole one would gain half the slope.
     if (std::max(here - there, length < 1 ? -slope / 2 : 0) <= std::max(end, rounding) * here) return;
     tangent =
         length == 1 && here - there < 0.05 * here ? runtime::Tangent::kExact : runtime::Tangent::kPositiveSemidefinite;

@@ -27,7 +27,7 @@ void pass_members(Archive& archive, SurfacePose& pose) {
   pass_all(archive, pose.positions, pose.rms, pose.farthest, pose.energy, pose.stiffness, pose.iterations, pose.worst);
 }
 
-/// Where the vertices of a surface and of its cage are in a pose that was found [m].
+/// A pose that was found: places of the vertices of a surface and of its cage [m].
 struct KnownPose {
   VertexArray surface, cage;
 };

@@ -12,6 +12,9 @@
 
 namespace exmat::precompute {
 
+/// Answers nearer to each other than this share of a table's tolerance are one minimum.
+inline constexpr double kSameMinimum = 0.1;
+
 /// p*(w) in the coordinates y of TargetSolver: of the minima that several starts lead to, the lowest; from the blend of
 /// the examples where none leads to one.
 class MinimumFinder {

@@ -20,7 +20,6 @@ using runtime::TargetSolver;
 constexpr int kMostSingleDegree = 8;
 constexpr double kTermOversampling = 1.25;  // degree of the nodes over that of a term
 constexpr int kPairDegrees[] = {4, 7, 10};  // that the nodes of a pair are for
-constexpr double kSameTermTarget = 0.1;     // of the tolerance: answers nearer to each other are one minimum
 // A term's share of the tolerance. Terms of pairs add up to no more than twice the largest that is left out, since they
 // are 4 w_k w_l of it and the weights add up to 1.
 constexpr double kTermShare = 0.3;
@@ -78,7 +77,7 @@ class TermBuilder {
         examples_(poses.cols()),
         error_(target, examples_),
         enough_(kTermShare * options.tolerance * error_.scale()),
-        finder_(target, kSameTermTarget * options.tolerance * error_.scale(), options.all) {}
+        finder_(target, kSameMinimum * options.tolerance * error_.scale(), options.all) {}
 
   std::optional<TargetTableData> run();
 

@@ -23,7 +23,6 @@ using runtime::TargetSolver;
 constexpr double kShare = 0.1;              // of the tolerance that the space may take
 constexpr int kRounds = 4;                  // in which weights whose targets the space misses are added
 constexpr double kNoDirection = 1e-9;       // of the largest example: a direction of poses that is rounding
-constexpr double kSame = 0.1;               // of the tolerance: answers nearer to each other are one minimum
 constexpr double kManyTolerance = 100;      // times the tolerance, of more examples than one polynomial is for
 constexpr int kCheckedTogether[] = {2, 3};  // of many examples, whose targets the space is checked by
 constexpr int kTableChecks = 8;  // targets of all tets on every edge of the simplex, that a table is checked by
@@ -143,7 +142,7 @@ MeshTarget SpaceBuilder::target_in(const PoseCoordinates& coordinates) const {
 
 // [d' x N], those that were found.
 Eigen::MatrixXd SpaceBuilder::solve(const RowMatrix& weights, const MinimumFinder::Starts& starts) {
-  MinimumFinder finder(whole_.solver, kSame * tolerance_ * scale_, whole_.all.get());
+  MinimumFinder finder(whole_.solver, kSameMinimum * tolerance_ * scale_, whole_.all.get());
   const RowMatrix minima = finder.find(weights, starts, "targets on the whole mesh");
   std::vector<Eigen::Index> found;
   for (Eigen::Index i = 0; i < minima.rows(); ++i)
@@ -159,13 +158,13 @@ PoseCoordinates SpaceBuilder::coordinates() const {
 // the largest example.
 double SpaceBuilder::check(int round) {
   const RowMatrix weights = check_weights(count_, round);
-  MinimumFinder finder(small_.solver, kSame * tolerance_ * scale_, small_.all.get());
+  MinimumFinder finder(small_.solver, kSameMinimum * tolerance_ * scale_, small_.all.get());
   const RowMatrix inside = finder.find(weights, from_blend(small_.solver), "targets in their space");
   const Eigen::MatrixXd guesses = columns_ * (small_.solver.basis() * inside.transpose());
   const auto from_space = [&](const Eigen::VectorXd&, Eigen::Index row) {
     return std::vector<Eigen::VectorXd>{guesses.col(row)};
   };
-  MinimumFinder polish(whole_.solver, kSame * tolerance_ * scale_, whole_.all.get());
+  MinimumFinder polish(whole_.solver, kSameMinimum * tolerance_ * scale_, whole_.all.get());
   polish.starts_are_near();
   const RowMatrix minima = polish.find(weights, from_space, "targets on the whole mesh");
   double error = 0;
@@ -241,7 +240,7 @@ std::optional<TargetTableData> SpaceBuilder::corrected_table(const TargetSolver&
   auto table = build_target_table(elements, poses, options, report);
   if (!table) return std::nullopt;
   const TableError meter(elements, count_);
-  MinimumFinder finder(elements, kSame * options.tolerance * meter.scale(), small_.all.get());
+  MinimumFinder finder(elements, kSameMinimum * options.tolerance * meter.scale(), small_.all.get());
   const RowMatrix weights = spread_points(count_, kTableChecks);
   const RowMatrix exact = finder.find(weights, from_blend(elements), "targets to check the table by");
   const double error = meter.errors(runtime::TargetTable(*table), {weights, exact}).maxCoeff();
@@ -255,7 +254,7 @@ std::optional<TargetTableData> SpaceBuilder::corrected_table(const TargetSolver&
 MinimumFinder::Correction SpaceBuilder::correction_of(const TargetSolver& elements) const {
   const runtime::BernsteinBasis basis(count_ == 2 ? 14 : count_ == 3 ? 8 : 5, static_cast<int>(count_));
   const RowMatrix weights = interpolation_nodes(basis.exponents());
-  const double same = kSame * tolerance_ * scale_;
+  const double same = kSameMinimum * tolerance_ * scale_;
   MinimumFinder of_elements(elements, same), of_all(elements, same, small_.all.get());
   const RowMatrix rough = of_elements.find(weights, from_blend(elements), "targets of the elements"),
                   exact = of_all.find(weights, from_blend(elements), "targets of all tets");

@@ -28,7 +28,6 @@ constexpr double kOversampling = 1.25;    // degree of the nodes over that of th
 constexpr int kChecksPerDimension = 64;   // weights on every edge; twice as many on every face
 constexpr Eigen::Index kTableStarts = 4;  // every fourth weight is solved from every start
 constexpr double kMargin = 0.7;           // of the tolerance: more may turn up between the checks
-constexpr double kSameTarget = 0.1;       // of the tolerance: answers nearer to each other are one minimum
 
 int most_degree(const TargetTableOptions& options, Eigen::Index examples) {
   if (options.most_degree > 0) return std::min(options.most_degree, BernsteinBasis::kMostDegree);
@@ -73,7 +72,7 @@ TableBuilder::TableBuilder(const TargetSolver& target, const Eigen::MatrixXd& po
       report_(report),
       examples_(poses.cols()),
       error_(target, examples_),
-      finder_(target, kSameTarget * options.tolerance * error_.scale(), options.all) {
+      finder_(target, kSameMinimum * options.tolerance * error_.scale(), options.all) {
   if (options.correction) finder_.correct_by(options.correction);
 }
 
@@ -216,7 +215,7 @@ std::optional<TargetTableData> build_target_table(const TargetSolver& target, co
 
 void shift_targets(const Eigen::MatrixXd& shifts, TargetTableData& table) {
   const Eigen::Index points = table.exponents.rows(), pieces = table.knots.size() - 1;
-  if (is_of_pairs(table)) {  // the constant and the terms of one example are the linear functions
+  if (is_of_pairs(table.exponents)) {  // the constant and the terms of one example are the linear functions
     table.control_points.row(0) += shifts.col(0).transpose();
     for (Eigen::Index row = 1; row < points; ++row)
       for (Eigen::Index k = 1; k < shifts.cols(); ++k)

@@ -262,10 +262,7 @@ std::vector<std::vector<NamedPose>> named_poses(const LoadedScene& loaded) {
 void check_compensation(const SceneConfig& config, const ReducedModel& data) {
   if (!config.examples || !data.targets) return;
   const double stiffness = data.targets->compensated_stiffness;
-  if (config.examples->compensate && data.skeleton)
-    throw InputError({config.file.string(), "/examples/compensate",
-                      "no such member of a body on bones, or whose clamp follows examples", "true",
-                      "its targets are those of its modes, in which it does not step: leave compensate out"});
+  if (data.skeleton) require_uncompensated(config);
   if (config.examples->compensate && stiffness == 0)
     throw InputError({config.file.string(), "/examples/compensate", "a bundle that was made for this scene",
                       config.bundle.string() + ", whose targets are not compensated",

@@ -53,8 +53,8 @@ class Cells {
   std::set<std::array<std::int64_t, 3>> cells_;
 };
 
-// What the wrap encloses. Mesh_3 begins with points where random rays from the middle meet the surface, and may so miss
-// what is thin and far from there. This domain may begin with a vertex of the wrap in each cell of a grid.
+// The domain is what the wrap encloses. Mesh_3 begins with points where random rays from the middle meet the surface,
+// and may so miss what is thin and far from there. This one may begin with a vertex of the wrap in each cell of a grid.
 class Domain : public SurfaceDomain {
  public:
   /// `grid`: the size of its cells; 0 begins as Mesh_3 does.
@@ -103,7 +103,7 @@ constexpr double kFacetAngle = 25;
 constexpr double kRadiusEdgeRatio = 2;
 // Dihedral angles that perturbing and exuding seek [degree].
 constexpr double kSliverBound = 14;
-// How near tets are to the surface that they fill, over the cell size, and some more.
+// Tets are nearer than this to the surface that they fill, over the cell size.
 constexpr double kCovered = 1.25;
 
 Wrap wrap_of(const MesherRequest& request) {

@@ -9,7 +9,7 @@ TargetTable::TargetTable(const TargetTableData& data)
       examples_(data.exponents.cols()),
       modes_(data.control_points.cols()),
       knots_(data.knots) {
-  if (exmat::is_of_pairs(data)) {
+  if (exmat::is_of_pairs(data.exponents)) {
     pairs_.emplace(data);
     return;
   }

@@ -1,7 +1,6 @@
 #include "runtime/sim/world/world.h"
 
 #include <algorithm>
-#include <numeric>
 
 #include "runtime/sim/space/full/full_body.h"
 #include "runtime/sim/step/contact_step.h"
@@ -17,16 +16,6 @@ constexpr std::size_t kSharedIsland = 32;  // bodies; a larger one is shared by 
 constexpr int kSleepersAtOnce = 256, kBoundsAtOnce = 32;  // bodies that a thread takes at a time
 
 Eigen::Vector3d linear_velocity(const WorldBody& body) { return body.model.frame->velocity(body.state.frame).linear; }
-
-/// The root of a body's tree of touching ones.
-int root_of(std::vector<int>& parents, int body) {
-  while (parents[static_cast<std::size_t>(body)] != body) {
-    int& parent = parents[static_cast<std::size_t>(body)];
-    parent = parents[static_cast<std::size_t>(parent)];
-    body = parent;
-  }
-  return body;
-}
 
 }  // namespace
 
@@ -494,13 +483,9 @@ bool World::is_linked(std::size_t pair) const {
 }
 
 void World::unite() {
-  parents_.resize(bodies_.size());
-  std::iota(parents_.begin(), parents_.end(), 0);
-  for (std::size_t p = 0; p < near_.size(); ++p) {
-    if (!is_linked(p)) continue;
-    const int a = root_of(parents_, near_[p].first), b = root_of(parents_, near_[p].second);
-    parents_[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
-  }
+  linked_.reset(bodies_.size());
+  for (std::size_t p = 0; p < near_.size(); ++p)
+    if (is_linked(p)) linked_.join(near_[p].first, near_[p].second);
 }
 
 /// Wakes all that an awake body is linked to. True if anybody woke.
@@ -508,10 +493,10 @@ bool World::wake_islands() {
   std::vector<int>& awake = place_in_island_;  // of each root
   awake.assign(bodies_.size(), 0);
   for (const int body : touching_)
-    if (!at(body).asleep) awake[static_cast<std::size_t>(root_of(parents_, body))] = 1;
+    if (!at(body).asleep) awake[static_cast<std::size_t>(linked_.root(body))] = 1;
   bool any = false;
   for (const int body : touching_) {
-    if (!at(body).asleep || awake[static_cast<std::size_t>(root_of(parents_, body))] == 0) continue;
+    if (!at(body).asleep || awake[static_cast<std::size_t>(linked_.root(body))] == 0) continue;
     wake(state(body));
     at(body).asleep = false;
     any = true;
@@ -534,7 +519,7 @@ void World::collect_islands() {
   place_in_island_.assign(bodies_.size(), -1);
   const auto is_used = [&](std::size_t p) { return is_gathered_[p] && !pairs_[p]->empty(); };
   const auto add_body = [&](int body) {
-    const auto root = static_cast<std::size_t>(root_of(parents_, body));
+    const auto root = static_cast<std::size_t>(linked_.root(body));
     if (island_of_[root] < 0) {
       if (island_count_ == islands_.size()) islands_.push_back(std::make_unique<Island>());
       Island& fresh = *islands_[island_count_];

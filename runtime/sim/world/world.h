@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/core/disjoint_sets.h"
 #include "runtime/sim/step/stepper.h"
 #include "runtime/sim/world/crowd.h"
 #include "runtime/sim/world/island.h"
@@ -194,7 +195,8 @@ class World {
   // State of one step.
   std::vector<Link> links_;  // in ascending order of the bodies
   bool found_contacts_ = false;
-  std::vector<int> order_, parents_, island_of_, place_in_island_;
+  std::vector<int> order_, island_of_, place_in_island_;
+  DisjointSets linked_;  // bodies that step together
   std::vector<std::pair<int, int>> near_, last_near_;
   std::vector<std::unique_ptr<PairContact>> pairs_, last_pairs_;  // the first of them, those of near_
   std::vector<bool> is_gathered_;                                 // of each pair

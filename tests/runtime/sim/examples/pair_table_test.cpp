@@ -5,12 +5,15 @@
 #include <vector>
 
 #include "runtime/sim/examples/bernstein_basis.h"
-#include "runtime/sim/examples/target_table.h"
+#include "tests/runtime/sim/examples/table_values.h"
 #include "tests/support/allocation_counter.h"
-#include "tests/support/random.h"
 
 namespace exmat::runtime {
 namespace pair_table_test {
+
+using test::derivative;
+using test::evaluate;
+using test::random_weights;
 
 constexpr Eigen::Index kModes = 11, kExamples = 6;
 
@@ -78,30 +81,11 @@ TargetTableData mixed_terms() {
   return data;
 }
 
-Eigen::VectorXd random_weights(std::uint32_t seed) {
-  const Eigen::VectorXd logarithms = (0.5 + 0.5 * test::random_vector(kExamples, seed).array()).log();
-  return logarithms / logarithms.sum();
-}
-
-Eigen::VectorXd evaluate(const TargetTable& table, const Eigen::VectorXd& weights) {
-  auto workspace = table.make_workspace();
-  Eigen::VectorXd target(table.modes());
-  table.evaluate(weights, workspace, target);
-  return target;
-}
-
-Eigen::MatrixXd derivative(const TargetTable& table, const Eigen::VectorXd& weights) {
-  auto workspace = table.make_workspace();
-  Eigen::MatrixXd jacobian(table.modes(), table.examples());
-  table.derivative(weights, workspace, jacobian);
-  return jacobian;
-}
-
 /// Inside the simplex, and with some weights zero.
 std::vector<Eigen::VectorXd> weights_of_all_kinds() {
   std::vector<Eigen::VectorXd> all;
   for (std::uint32_t seed = 0; seed < 20; ++seed) {
-    Eigen::VectorXd w = random_weights(seed + 1);
+    Eigen::VectorXd w = random_weights(kExamples, seed + 1);
     all.push_back(w);
     for (const Eigen::Index k : {seed % kExamples, (seed + 2) % kExamples, (2 * seed + 1) % kExamples}) w[k] = 0;
     all.emplace_back(w / w.sum());
@@ -156,7 +140,7 @@ TEST(PairTable, DerivativeIsThatOfDifferences) {
   const TargetTable table(mixed_terms());
   constexpr double kStep = 1e-4;
   for (std::uint32_t seed = 1; seed < 20; ++seed) {
-    const Eigen::VectorXd w = random_weights(seed), along = random_weights(seed + 50) - w;
+    const Eigen::VectorXd w = random_weights(kExamples, seed), along = random_weights(kExamples, seed + 50) - w;
     const Eigen::VectorXd expected =
         (evaluate(table, w + kStep * along) - evaluate(table, w - kStep * along)) / (2 * kStep);
     EXPECT_LE((derivative(table, w) * along - expected).norm(), 1e-6 * (1 + expected.norm()));
@@ -170,7 +154,7 @@ TEST(PairTable, AllocatesNothing) {
   auto workspace = table.make_workspace();
   Eigen::VectorXd target(kModes);
   Eigen::MatrixXd jacobian(kModes, kExamples);
-  const Eigen::VectorXd w = random_weights(1);
+  const Eigen::VectorXd w = random_weights(kExamples, 1);
   std::size_t allocations = 0;
   {
     const test::AllocationCounter counter;

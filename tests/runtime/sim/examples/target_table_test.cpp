@@ -5,11 +5,15 @@
 #include <gtest/gtest.h>
 #include <vector>
 
+#include "tests/runtime/sim/examples/table_values.h"
 #include "tests/support/allocation_counter.h"
-#include "tests/support/random.h"
 
 namespace exmat::runtime {
 namespace target_table_test {
+
+using test::derivative;
+using test::evaluate;
+using test::random_weights;
 
 constexpr Eigen::Index kModes = 13;
 
@@ -27,11 +31,6 @@ TargetTableData random_table(const Shape& shape, std::uint32_t seed = 1) {
   return data;
 }
 
-Eigen::VectorXd random_weights(Eigen::Index count, std::uint32_t seed) {
-  const Eigen::VectorXd logarithms = (0.5 + 0.5 * test::random_vector(count, seed).array()).log();
-  return logarithms / logarithms.sum();
-}
-
 /// Inside, then on each face, then all corners.
 std::vector<Eigen::VectorXd> all_kinds_of_weights(int examples) {
   std::vector<Eigen::VectorXd> all;
@@ -43,20 +42,6 @@ std::vector<Eigen::VectorXd> all_kinds_of_weights(int examples) {
       all.push_back(w / w.sum());
     }
   return all;
-}
-
-Eigen::VectorXd evaluate(const TargetTable& table, const Eigen::VectorXd& weights) {
-  auto workspace = table.make_workspace();
-  Eigen::VectorXd target(table.modes());
-  table.evaluate(weights, workspace, target);
-  return target;
-}
-
-Eigen::MatrixXd derivative(const TargetTable& table, const Eigen::VectorXd& weights) {
-  auto workspace = table.make_workspace();
-  Eigen::MatrixXd jacobian(table.modes(), table.examples());
-  table.derivative(weights, workspace, jacobian);
-  return jacobian;
 }
 
 /// D!/(a_1! ... a_K!) w^a from its definition.
