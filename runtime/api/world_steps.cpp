@@ -25,6 +25,7 @@ void add(const WorldReport& step, exmat_world_report& sum) noexcept {
   sum.islands = step.islands;
   sum.largest_island = std::max<std::int64_t>(sum.largest_island, step.largest_island);
   sum.asleep = step.asleep;
+  sum.divided_islands += step.divided_islands;
 }
 
 /// A body that the last step left because of a number that is not finite; null: none.

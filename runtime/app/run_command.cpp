@@ -58,6 +58,7 @@ void print_summary(const RunSummary& summary, const LoadedWorld& loaded, const W
     print("target iterations", fmt::format("{:.2f} a step", summary.target_iterations.mean()));
   print("projections", std::to_string(summary.projections));
   print("unconverged steps", std::to_string(summary.unconverged_steps));
+  if (summary.divided_steps > 0) print("divided steps", std::to_string(summary.divided_steps));
   if (any_kind([](const LoadedKind& kind) { return kind.loaded.scene.sleep.energy > 0; }))
     print("steps asleep", fmt::format("{} of {}", summary.slept_steps, summary.steps * summary.bodies));
   print("kinetic energy", fmt::format("{:.6g} J", summary.end.kinetic));
@@ -107,6 +108,9 @@ void claim_outputs(const WorldConfig& config, const RunCommandOptions& options) 
 }
 
 void warn_of_steps(const RunSummary& summary, const WorldConfig& config) {
+  if (summary.divided_steps > 0)
+    log::info(fmt::format("{} of {} steps had no solution and were taken in several smaller ones",
+                          summary.divided_steps, summary.steps * summary.bodies));
   if (summary.unconverged_islands > 0)
     log::warning(
         fmt::format("{} solutions of bodies that touch did not reach the tolerance; a smaller time_step or "

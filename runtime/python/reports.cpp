@@ -95,6 +95,8 @@ void bind_world_report(py::module_& module) {
       .def_readonly("largest_island", &exmat_world_report::largest_island, "Most bodies of an island in any step.")
       .def_readonly("seconds", &exmat_world_report::seconds, "Wall clock [s].")
       .def_readonly("asleep", &exmat_world_report::asleep, "Bodies that slept through the last step.")
+      .def_readonly("divided_islands", &exmat_world_report::divided_islands,
+                    "Bodies that touch and took several smaller steps, in all steps.")
       .def("__repr__", [](const exmat_world_report& report) {
         return py::str("WorldReport(steps={}, newton_iterations={}, touching_pairs={}, islands={}, seconds={:.3g})")
             .format(report.steps, report.newton_iterations, report.touching_pairs, report.islands, report.seconds);

@@ -139,6 +139,7 @@ void add(const WorldReport& step, const World& world, double seconds, RunSummary
     target += report.target_iterations;
     summary.projections += report.projections;
     if ((report.status & kStepUnconverged) != 0) ++summary.unconverged_steps;
+    if ((report.status & kStepDivided) != 0) ++summary.divided_steps;
   }
   ++summary.steps;
   summary.slept_steps += step.asleep;

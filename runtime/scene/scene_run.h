@@ -54,6 +54,7 @@ struct RunSummary {
   Samples target_iterations;           ///< likewise
   std::int64_t projections = 0;        ///< sum over all bodies
   std::int64_t unconverged_steps = 0;  ///< residual above the tolerance; of all bodies
+  std::int64_t divided_steps = 0;      ///< taken in several smaller ones; of all bodies
   std::int64_t slept_steps = 0;        ///< that bodies slept through; of all bodies
   Samples touching_pairs;              ///< pairs of bodies near enough to touch
   int most_pairs = 0;

@@ -189,7 +189,8 @@ enum {
   EXMAT_STEP_STAGNATED = 4,            /* likewise, and no descent is left: rounding */
   EXMAT_STEP_TARGET_NOT_CONVERGED = 8, /* the next step carries on */
   EXMAT_STEP_SUBNORMAL = 16,           /* no fault: numbers below 2.2e-308 were set to zero */
-  EXMAT_STEP_ASLEEP = 32               /* no fault: the body rests, see sleep_energy; its contacts are not told */
+  EXMAT_STEP_ASLEEP = 32,              /* no fault: the body rests, see sleep_energy; its contacts are not told */
+  EXMAT_STEP_DIVIDED = 64              /* no fault: it had no solution in one step, and took several smaller ones */
 };
 
 /* Results of the steps of one call: sums, unless said otherwise. */

@@ -101,13 +101,15 @@ typedef struct exmat_world_report {
   int64_t largest_island;      /* most bodies of an island in any step */
   double seconds;              /* wall clock */
   int64_t asleep;              /* bodies that slept through the last step */
+  int64_t divided_islands;     /* bodies that touch and took several smaller steps, in all steps */
 } exmat_world_report;
 
 /* Takes `steps` >= 0 steps of all bodies, by up to `threads` threads (0: as many as there are processors), and never
    more than there are bodies and processors, or than the system lets start; the results do not depend on their number.
    Those of bodies that go side by side are those of exmat_body_step() to rounding, as sums are taken in another order.
    EXMAT_NON_FINITE names the first such body: it, and what touches it, are as they were before
-   that step, which the others have taken. `report` may be NULL. Allocates where more touches than ever before. */
+   that step, which the others have taken. `report` may be NULL. Allocates where more touches than ever before,
+   and where a step is divided. */
 EXMAT_API exmat_status exmat_world_step(exmat_world* world, int64_t steps, int32_t threads,
                                         exmat_world_report* report) EXMAT_NOEXCEPT;
 

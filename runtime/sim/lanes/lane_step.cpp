@@ -9,6 +9,7 @@
 
 #include "runtime/sim/lanes/fetch_ahead.h"
 #include "runtime/sim/step/body_step.h"
+#include "runtime/sim/step/divided_step.h"
 #include "runtime/sim/step/example_forces.h"
 #include "runtime/sim/step/sleep.h"
 #include "runtime/sim/step/stepper.h"
@@ -61,7 +62,7 @@ class LaneStep {
     for (std::size_t l = 0; l < bodies_.size(); ++l) {
       const LaneBody& body = bodies_[l];
       Workspace& own = *own_[l];
-      if (alone_[l]) {
+      if (alone_[l] || has_no_solution(reports_[l], body.scene->newton)) {
         reports[l] = step(model_, *body.scene, *body.state, own);
         continue;
       }
@@ -372,7 +373,7 @@ class LaneStep {
       }
       PotentialEvaluation here;
       here.potential.value = here_.value[lane];
-      here.force_scale = here_.scale[lane];
+      here.force_scale = report.force_scale = here_.scale[lane];
       const auto reason = reason_to_end(report, bodies_[l].scene->newton, here, unchecked_from_[l]);
       if (!reason) return;
       if (*reason == NewtonStatus::kNonFinite) {

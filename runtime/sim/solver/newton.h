@@ -34,7 +34,8 @@ enum class NewtonStatus {
   kConverged,
   kIterationLimit,
   kStagnated,  ///< no lower value along the direction, or all of the decrease below rounding
-  kNonFinite,  ///< x may hold anything
+  kNonFinite,   ///< x may hold anything
+  kAboveStart,  ///< a minimum that lies above where the bodies stand, which is none of theirs
 };
 
 struct NewtonReport {
@@ -44,6 +45,7 @@ struct NewtonReport {
   int line_search_evaluations = 0;  ///< beyond the one that each iteration needs
   int projections = 0;              ///< times that the exact Hessian was not positive definite
   double residual = 0;              ///< |gradient| at the end
+  double force_scale = 0;           ///< that of the last evaluation
 };
 
 /// Why a minimisation ends at an iterate; nothing where it goes on. `unchecked_from` is the residual before a step that
@@ -225,6 +227,7 @@ NewtonReport newton_minimise(Problem& problem, const NewtonSettings& settings, E
   Hessian state = begins_with_factor ? Hessian::kFactorised : Hessian::kEvaluated;
   const auto finish = [&](NewtonStatus status) {
     report.status = status;
+    report.force_scale = here.force_scale;
     return report;
   };
   bool gyroscopic = false;

@@ -139,7 +139,8 @@ void add_newton_report(const NewtonReport& newton, StepReport& report) noexcept 
   report.residual = newton.residual;
   if (newton.status == NewtonStatus::kNonFinite) report.status |= kStepNonFinite;
   if (newton.status == NewtonStatus::kIterationLimit) report.status |= kStepIterationLimit;
-  if (newton.status == NewtonStatus::kStagnated) report.status |= kStepStagnated;
+  if (newton.status == NewtonStatus::kStagnated || newton.status == NewtonStatus::kAboveStart)
+    report.status |= kStepStagnated;
 }
 
 bool begins_anew(const Model& model, const StepScene& scene, const State& state) noexcept {

@@ -50,6 +50,7 @@ bool is_near_obstacles(const Model& model, const StepScene& scene, State& state,
 void add(const NewtonReport& more, NewtonReport& total) noexcept {
   total.status = more.status;
   total.residual = more.residual;
+  total.force_scale = more.force_scale;
   total.iterations += more.iterations;
   total.factorisations += more.factorisations;
   total.line_search_evaluations += more.line_search_evaluations;

@@ -13,6 +13,7 @@ enum StepStatus : std::uint32_t {
   kTargetNotConverged = 8,  ///< the target is its last iterate
   kStepSubnormal = 16,      ///< no fault: numbers of q or v below 2.2e-308 were set to zero, which keeps steps fast
   kStepAsleep = 32,         ///< no fault: the body rests, and the step has left it alone
+  kStepDivided = 64,        ///< no fault: taken in several smaller ones
 };
 
 /// The bits that say that a residual is above its tolerance.

@@ -2,16 +2,37 @@
 
 #include "runtime/sim/step/body_step.h"
 #include "runtime/sim/step/contact_step.h"
+#include "runtime/sim/step/divided_step.h"
 #include "runtime/sim/step/example_forces.h"
 #include "runtime/sim/step/sleep.h"
 
 namespace exmat::runtime {
+namespace {
+
+StepReport step_in_parts(const Model& model, const StepScene& scene, State& state, Workspace& workspace) {
+  DividedStep divided(scene, state);
+  StepReport last;
+  const auto take = [&](int part) {
+    divided.begin_part(part);
+    BodyStep step(model, divided.scene(), state, workspace);
+    step.begin(/*touches_others=*/false);
+    last = step.finish(step.solve());
+    divided.end_part(last);
+    return last.status;
+  };
+  if (take_in_parts([&](int parts) { divided.begin(parts); }, take)) return divided.end();
+  take(0);
+  return last;
+}
+
+}  // namespace
 
 StepReport step(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept {
   if (sleeps(model, scene, state)) return sleep_through(scene, state);
   BodyStep step(model, scene, state, workspace);
   step.begin(/*touches_others=*/false);
-  return step.finish(step.solve());
+  const NewtonReport newton = step.solve();
+  return has_no_solution(newton, scene.newton) ? step_in_parts(model, scene, state, workspace) : step.finish(newton);
 }
 
 void refresh_weights(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept {

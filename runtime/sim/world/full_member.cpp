@@ -23,8 +23,8 @@ void FullMember::place_surface() {
   surface_.place(frame, position, velocity);
 }
 
-bool FullMember::begin() noexcept {
-  step_.emplace(full_, model_, scene_, state_, workspace_, own_);
+bool FullMember::begin(const StepScene& scene) noexcept {
+  step_.emplace(full_, model_, scene, state_, workspace_, own_);
   return step_->begin(/*touches_others=*/true);
 }
 

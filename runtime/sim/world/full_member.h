@@ -16,6 +16,8 @@ class FullMember {
   FullMember(const FullModel& full, const Model& model, const StepScene& scene, State& state, Workspace& workspace,
              FullWorkspace& own, const TouchingSurface& touching);
 
+  /// Factors for the steps of a scene; allocates where they are of another.
+  void fit(const StepScene& scene) { own_.fit(full_, scene); }
   /// Puts the surface where the state says, for searches.
   void place_surface();
   MovingSurface& surface() noexcept { return surface_; }
@@ -23,7 +25,7 @@ class FullMember {
 
   // One step, in this order; evaluations as often as needed.
 
-  bool begin() noexcept;
+  bool begin(const StepScene& scene) noexcept;
   Eigen::Index unknowns() const noexcept { return full_.space.field_size(); }
   /// After a begin() of numbers that are not finite: no step will be taken.
   void fail() noexcept { own_.d.setConstant(std::numeric_limits<double>::quiet_NaN()); }
@@ -84,6 +86,7 @@ class FullMember {
   Eigen::Matrix3d inertia() const noexcept { return own_.potential.rigid.inertia; }  ///< after finish() [kg m^2]
   /// True if something outside moves parts of it.
   bool is_driven() const noexcept { return full_.is_driven() || is_held(state_.attachments); }
+  bool has_bones() const noexcept { return full_.skin.has_value(); }
   Energies energies() const noexcept { return runtime::energies(&full_, model_, scene_, state_); }
 
  private:

@@ -31,8 +31,8 @@ bool has_full(std::span<WorldBody* const> bodies) noexcept {
 /// Those of the first body, or of the first in full space.
 const NewtonSettings& newton_of(std::span<WorldBody* const> bodies) noexcept {
   for (const WorldBody* const own : bodies)
-    if (own->full) return own->scene.space.newton;
-  return bodies.front()->scene.newton;
+    if (own->full) return own->scene().space.newton;
+  return bodies.front()->scene().newton;
 }
 
 }  // namespace
@@ -537,7 +537,7 @@ void stay(std::span<WorldBody* const> bodies, Eigen::VectorXd& x) noexcept {
 /// step that they would be deep in each other.
 bool is_doubtful(const NewtonReport& newton, std::span<WorldBody* const> bodies) noexcept {
   return newton.iterations > kSureIterations || std::ranges::any_of(bodies, [](const WorldBody* own) {
-           const double way = own->scene.time_step * own->start_velocity.norm();
+           const double way = own->scene().time_step * own->start_velocity.norm();
            return way > kFast * own->surface.bound(own->state.q).radius;
          });
 }
@@ -565,7 +565,7 @@ void start_search(WorldBody& body, std::span<PairContact* const> pairs, std::spa
   });
   if (body.rigid() == 0 || !(touched || body.state.contacts.count > 0)) return;
   const Eigen::Vector3d end =
-      body.model.frame->placement(body.state.frame).position + body.scene.time_step * body.start_velocity;
+      body.model.frame->placement(body.state.frame).position + body.scene().time_step * body.start_velocity;
   x.head<3>() = end - body.problem->place(body.near().x).position;
 }
 
@@ -588,17 +588,12 @@ NewtonReport solve_island(std::span<WorldBody* const> bodies, std::span<PairCont
     for (WorldBody* const own : bodies) start_at(*own, workspace.x, own->state.q);
     add(minimise(problem, bodies, pairs, threads, workspace), total);
     if (total.status == NewtonStatus::kConverged && is_above_start(problem, bodies, workspace))
-      total.status = NewtonStatus::kStagnated;
+      total.status = NewtonStatus::kAboveStart;
   }
   for (WorldBody* const own : bodies)
     if (!own->full) own->near().x = workspace.x.segment(own->offset, own->unknowns());
   return total;
 }
-
-/// Kinetic, elastic and potential energy of bodies together, and that of springs between them [J].
-struct IslandEnergy {
-  double kinetic = 0, total = 0;
-};
 
 IslandEnergy energy_of(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs) noexcept {
   IslandEnergy sum;
@@ -610,13 +605,6 @@ IslandEnergy energy_of(std::span<WorldBody* const> bodies, std::span<PairContact
   }
   return sum;
 }
-
-/// Energy of an island where a step begins [J].
-struct IslandStart {
-  IslandEnergy bodies;
-  double springs = 0;   ///< energy of all contacts between them
-  double accounts = 0;  ///< the most that these may ever give back
-};
 
 IslandStart start_accounts(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs) noexcept {
   IslandStart start{energy_of(bodies, pairs)};
@@ -632,7 +620,7 @@ IslandStart start_accounts(std::span<WorldBody* const> bodies, std::span<PairCon
 bool is_isolated(std::span<WorldBody* const> bodies, const IslandBegin& begin) noexcept {
   return begin.is_alone && std::ranges::none_of(bodies, [](const WorldBody* own) {
            const FreeState& free = free_state(own->state);
-           return runs_examples(own->scene) || !own->scene.forces.empty() || !own->state.applied_force.isZero(0) ||
+           return runs_examples(own->scene()) || !own->scene().forces.empty() || !own->state.applied_force.isZero(0) ||
                   !free.applied_force.isZero(0) || !free.applied_torque.isZero(0);
          });
 }
@@ -683,7 +671,7 @@ void settle(std::span<WorldBody* const> bodies, IslandWorkspace& workspace) noex
   if (count == 0) return;
   const auto mobility_of = [&](int number) {
     const WorldBody& own = *bodies[static_cast<std::size_t>(number)];
-    const double dt = own.scene.time_step;
+    const double dt = own.scene().time_step;
     return own.rigid() > 0 ? dt * dt / own.model.frame->inertia_of_momenta()->mass() : 0;
   };
   Eigen::MatrixXd& W = workspace.mobility;
@@ -719,26 +707,33 @@ void settle(std::span<WorldBody* const> bodies, IslandWorkspace& workspace) noex
 
 }  // namespace
 
-NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
-                         std::span<const std::vector<Incidence>> incidences, int threads, IslandWorkspace& workspace) {
+NewtonReport begin_island_step(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
+                               std::span<const std::vector<Incidence>> incidences, int threads,
+                               IslandWorkspace& workspace) {
   for_all(bodies.size(), threads, [&](std::size_t i) {
     WorldBody& own = *bodies[i];
     own.start_velocity = own.model.frame->velocity(own.state.frame).linear;
     if (own.full) {
-      if (!own.full->begin()) own.full->fail();
+      if (!own.full->begin(own.scene())) own.full->fail();
       return;
     }
-    own.step.emplace(own.model, own.scene, own.state, own.workspace);
+    own.step.emplace(own.model, own.scene(), own.state, own.workspace);
     own.step->begin(/*touches_others=*/true);
     if (own.step->prepare()) {
-      start_contact(own.model, own.scene, own.state, own.workspace);
+      start_contact(own.model, own.scene(), own.state, own.workspace);
     } else {
       own.near().x.setConstant(std::numeric_limits<double>::quiet_NaN());
     }
     own.problem.emplace(own.model, own.state, own.step->potential(), own.workspace);
   });
-  const IslandStart start = start_accounts(bodies, pairs);
-  NewtonReport newton = solve_island(bodies, pairs, incidences, threads, workspace);
+  workspace.start = start_accounts(bodies, pairs);
+  return solve_island(bodies, pairs, incidences, threads, workspace);
+}
+
+NewtonReport end_island_step(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
+                             std::span<const std::vector<Incidence>> incidences, NewtonReport newton,
+                             IslandWorkspace& workspace) {
+  const IslandStart& start = workspace.start;
   const bool converged = newton.status == NewtonStatus::kConverged;
   if (converged) settle(bodies, workspace);
   begin_of(bodies, workspace.begin);
@@ -800,7 +795,7 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
     else if (!own->state.q.allFinite() || !own->state.v.allFinite())  // by what limited the energy
       own->report.status |= kStepNonFinite;
     if (newton.status == NewtonStatus::kStagnated) own->report.status |= kStepStagnated;
-    rest = rests(own->model, own->scene, own->report, own->state) && rest;
+    rest = rests(own->model, own->scene(), own->report, own->state) && rest;
   }
   if (rest)
     for (WorldBody* const own : bodies) {

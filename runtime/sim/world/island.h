@@ -17,6 +17,18 @@ struct HardAttachment {
   PairAttachment* attachment = nullptr;
 };
 
+/// Kinetic, elastic and potential energy of bodies together, and that of springs between them [J].
+struct IslandEnergy {
+  double kinetic = 0, total = 0;
+};
+
+/// Energy of an island where a step begins [J].
+struct IslandStart {
+  IslandEnergy bodies;
+  double springs = 0;   ///< energy of all contacts between them
+  double accounts = 0;  ///< the most that these may ever give back
+};
+
 /// Scratch of the steps of islands; grows, holds nothing from step to step.
 struct IslandWorkspace {
   NewtonWorkspace newton;
@@ -27,6 +39,7 @@ struct IslandWorkspace {
   std::vector<Eigen::VectorXd> unknowns;         ///< one per body
   Eigen::VectorXd right;  ///< right-hand side of conjugate gradients, where bodies are in full space
   IslandBegin begin;
+  IslandStart start;
   std::vector<FrameMomenta> from_others;  ///< force and torque of other bodies on each
 
   // Linear solutions.
@@ -111,9 +124,14 @@ class IslandProblem {
   int conjugate_gradients_ = 0;
 };
 
-/// One step of the bodies of an island, from BodyStep's begin() to its report; they fall asleep together. Returns
-/// Newton's report, the same for all of them.
-NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
-                         std::span<const std::vector<Incidence>> incidences, int threads, IslandWorkspace& workspace);
+/// Solves a step of the bodies of an island, from BodyStep's begin() on. Their states stay, and the report is Newton's,
+/// the same for all of them.
+NewtonReport begin_island_step(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
+                               std::span<const std::vector<Incidence>> incidences, int threads,
+                               IslandWorkspace& workspace);
+/// Takes that step, whatever came out, up to the bodies' reports; they fall asleep together.
+NewtonReport end_island_step(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
+                             std::span<const std::vector<Incidence>> incidences, NewtonReport newton,
+                             IslandWorkspace& workspace);
 
 }  // namespace exmat::runtime

@@ -67,12 +67,12 @@ void go_on_together(std::span<WorldBody* const> bodies, const IslandBegin& begin
     WorldBody& own = *bodies[i];
     const BodyBegin& from = begin.bodies[i];
     if (own.full) {
-      own.full->step().put(from.q, from.elastic_energy, own.scene.time_step / mass * begin.momenta.total.linear);
+      own.full->step().put(from.q, from.elastic_energy, own.scene().time_step / mass * begin.momenta.total.linear);
       own.placement = own.model.frame->placement(own.state.frame);
       continue;
     }
     FrameMotion motion = from.motion;
-    motion.position += own.scene.time_step / mass * begin.momenta.total.linear;
+    motion.position += own.scene().time_step / mass * begin.momenta.total.linear;
     motion.linear_velocity.setZero();
     motion.angular_velocity.setZero();
     own.state.q = own.near().q = from.q;

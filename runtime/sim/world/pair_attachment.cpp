@@ -41,7 +41,7 @@ void PairAttachment::set_places(const BodyPose& own, const BodyPose& other) noex
 void PairAttachment::begin(Attachment& attachment, int side, const WorldBody& first, const WorldBody& second) noexcept {
   attachment_ = &attachment;
   side_ = side;
-  rate_ = 1 / first.scene.time_step;
+  rate_ = 1 / first.scene().time_step;
   force_.setZero();
   torque_.setZero();
   const WorldBody &own = side == 0 ? first : second, &other = side == 0 ? second : first;

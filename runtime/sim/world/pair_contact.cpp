@@ -63,7 +63,7 @@ void PairContact::gather(const ContactLaw& law, int side, const WorldBody& own, 
     near.radius = -1;
     near.without = 1;
   }
-  CandidateSearch search{own.scene.time_step, margin, own.anew || other.anew, held, other.placed_shape(), near};
+  CandidateSearch search{own.scene().time_step, margin, own.anew || other.anew, held, other.placed_shape(), near};
   if (is_own()) return contact.gather_own(own.touching_body(), search, candidates_[at]);
   const TouchingBody its_own = own.touching_body(), its_other = other.touching_body();
   if (search.anew) {
@@ -112,7 +112,7 @@ void PairContact::end_account(const WorldBody& first, const WorldBody& second, c
     }
   }
   if (converged)
-    account_ += 0.5 * first.scene.time_step * force.dot(parted) - given;
+    account_ += 0.5 * first.scene().time_step * force.dot(parted) - given;
   else
     account_ += spring_energy() - start_energy_;
   account_ = std::isfinite(account_) ? std::max(0.0, account_) : 0;

@@ -1,9 +1,11 @@
 #include "runtime/sim/world/world.h"
 
 #include <algorithm>
+#include <deque>
 
 #include "runtime/sim/space/full/full_body.h"
 #include "runtime/sim/step/contact_step.h"
+#include "runtime/sim/step/divided_step.h"
 #include "runtime/sim/step/sleep.h"
 #include "runtime/sim/world/broad_phase.h"
 #include "runtime/sim/world/for_all.h"
@@ -200,7 +202,7 @@ void World::enter_full(Member& member) {
   take_full_scratch(member);
   if (!member.touching) return;
   WorldBody& own = *member.touching;
-  own.full = std::make_unique<FullMember>(*member.kind.full, own.model, own.scene, own.state, own.workspace,
+  own.full = std::make_unique<FullMember>(*member.kind.full, own.model, own.scene(), own.state, own.workspace,
                                           *member.full, *own.touching);
   member.is_bounded = false;
 }
@@ -291,6 +293,7 @@ WorldReport World::step(int threads, StepObserver* observer) {
     report.largest_island = std::max(report.largest_island, static_cast<int>(island.bodies.size()));
     report.newton_iterations = std::max(report.newton_iterations, island.newton.iterations);
     if (island.newton.status != NewtonStatus::kConverged) ++report.unconverged_islands;
+    if (island.divided) ++report.divided_islands;
   }
   return report;
 }
@@ -342,7 +345,7 @@ void World::step_islands(int threads, StepObserver* observer) {
     const StageTimer timer(profile_, WorldStage::kIslands);
     const auto is_large = [](const Island& island) { return island.bodies.size() > kSharedIsland; };
     const auto solve = [&](Island& island, int own_threads) {
-      island.newton = step_island(island.bodies, island.pairs, island.incidences, own_threads, island.workspace);
+      island.newton = step_island(island, own_threads);
       for (std::size_t i = 0; i < island.bodies.size(); ++i) {
         const WorldBody& body = *island.bodies[i];
         at(island.numbers[i]).report = body.report;
@@ -359,20 +362,86 @@ void World::step_islands(int threads, StepObserver* observer) {
   remember();
 }
 
+NewtonReport World::step_island(Island& island, int threads) {
+  auto& [bodies, numbers, pairs, near, incidences, held, workspace, newton, divided] = island;
+  newton = begin_island_step(bodies, pairs, incidences, threads, workspace);
+  const auto may_divide = [](const WorldBody* own) { return !own->full || !own->full->has_bones(); };
+  divided = has_no_solution(newton, bodies.front()->scene().newton) && std::ranges::all_of(bodies, may_divide);
+  return divided ? step_in_parts(island, threads) : end_island_step(bodies, pairs, incidences, newton, workspace);
+}
+
+NewtonReport World::step_in_parts(Island& island, int threads) {
+  auto& [bodies, numbers, pairs, near, incidences, held, workspace, newton, divided] = island;
+  std::deque<DividedStep> steps;
+  for (const WorldBody* const own : bodies) steps.emplace_back(own->scene(), own->state);
+  std::vector<bool> anew;
+  for (const WorldBody* const own : bodies) anew.push_back(own->anew);
+  NewtonReport sum;
+  const auto begin = [&](int parts) {
+    sum = {};
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      steps[i].begin(parts);
+      bodies[i]->take_scene(parts > 1 ? &steps[i].scene() : nullptr);
+      bodies[i]->anew = anew[i];
+    }
+  };
+  const auto take = [&](int part) {
+    for (DividedStep& step : steps) step.begin_part(part);
+    gather_again(island, part == 0);
+    const NewtonReport own = begin_island_step(bodies, pairs, incidences, threads, workspace);
+    const NewtonStatus before = sum.status;
+    runtime::add(end_island_step(bodies, pairs, incidences, own, workspace), sum);
+    if (sum.status == NewtonStatus::kConverged) sum.status = before;
+    std::uint32_t status = 0;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      bodies[i]->anew = false;
+      steps[i].end_part(bodies[i]->report);
+      status |= bodies[i]->report.status;
+    }
+    return status;
+  };
+  divided = take_in_parts(begin, take);
+  if (!divided) take(0);
+  for (std::size_t i = 0; divided && i < bodies.size(); ++i) {
+    bodies[i]->report = steps[i].end();
+    bodies[i]->take_scene(nullptr);
+  }
+  return sum;
+}
+
+/// Candidates of an island's pairs at the start of a step, or after a part of it.
+void World::gather_again(Island& island, bool at_start) {
+  island.held.resize(std::max(island.held.size(), island.pairs.size()));
+  for (std::size_t k = 0; !at_start && k < island.pairs.size(); ++k) {
+    const auto [first, second] = near_[island.near[k]];
+    island.pairs[k]->commit(touching(first), touching(second), island.held[k]);
+  }
+  for (WorldBody* const own : island.bodies) own->place_surface();
+  for (std::size_t k = 0; k < island.pairs.size(); ++k) {
+    PairContact& pair = *island.pairs[k];
+    const auto [first, second] = near_[island.near[k]];
+    if (!begin_pair(island.near[k], at_start ? held_of(first, second) : &island.held[k])) {
+      gather_side(pair, 0, first, second);
+      if (first != second) gather_side(pair, 1, second, first);
+    }
+    number_bodies(island.near[k]);
+  }
+}
+
 /// A ball that holds the body at the end of the step, too. Of a body that sleeps it stays what it is.
 void World::bound(int body) {
   Member& member = at(body);
   if (member.asleep && member.is_bounded) return;
   member.is_bounded = member.asleep;
   WorldBody& own = *member.touching;
-  const double dt = own.scene.time_step;
+  const double dt = own.scene().time_step;
   const auto index = static_cast<std::size_t>(body);
   if (own.full) {
     own.full->place_surface();
     const MovingSurface& surface = own.full->surface();
     const double straight = dt * linear_velocity(own).norm();
     margins_[index] =
-        kContactMarginSteps * std::max(0.0, dt * surface.speed() - straight) + dt * dt * own.scene.gravity.norm();
+        kContactMarginSteps * std::max(0.0, dt * surface.speed() - straight) + dt * dt * own.scene().gravity.norm();
     balls_[index] = surface.bound();
     balls_[index].radius += margins_[index] + kContactMarginSteps * straight;
     return;
@@ -381,7 +450,7 @@ void World::bound(int body) {
   const BodyVelocity velocity{own.model.frame->velocity(own.state.frame), own.state.v};
   const double travel = own.contact().travel_bound(pose, velocity, dt);
   const double straight = dt * velocity.linear.norm();
-  margins_[index] = kContactMarginSteps * (travel - straight) + dt * dt * own.scene.gravity.norm();
+  margins_[index] = kContactMarginSteps * (travel - straight) + dt * dt * own.scene().gravity.norm();
   const DeformationTree::Ball ball = own.surface.bound(own.state.q);
   balls_[index] = {pose.position + pose.rotation * ball.centre,
                    ball.radius + margins_[index] + kContactMarginSteps * straight};
@@ -404,7 +473,7 @@ void World::find_pairs(int threads) {
       near_.push_back(link.bodies);
   for (const int body : touching_) {
     const WorldBody& own = touching(body);
-    if (own.touching->may_meet_itself(own.state.q, own.state.v, own.scene.time_step)) near_.emplace_back(body, body);
+    if (own.touching->may_meet_itself(own.state.q, own.state.v, own.scene().time_step)) near_.emplace_back(body, body);
   }
   if (near_.size() > others) std::ranges::sort(near_);
   keep_pairs();
@@ -441,13 +510,12 @@ const HeldPair* World::held_of(int first, int second) const {
 double World::margin_between(int own, int other) const noexcept {
   const WorldBody &a = touching(own), &b = touching(other);
   if (own == other) return kOwnMargin * balls_[static_cast<std::size_t>(own)].radius;
-  const double straight = kContactMarginSteps * b.scene.time_step * (linear_velocity(a) - linear_velocity(b)).norm();
+  const double straight = kContactMarginSteps * b.scene().time_step * (linear_velocity(a) - linear_velocity(b)).norm();
   return margins_[static_cast<std::size_t>(own)] + margins_[static_cast<std::size_t>(other)] + straight;
 }
 
 /// Candidates of pairs of which one is awake, the surface of one body at a time: what is computed of its shape serves
-/// all that are near. Bodies that are attached to each other do not touch: contacts where the patches meet would work
-/// against the attachment.
+/// all that are near.
 void World::gather(int threads) {
   const StageTimer timer(profile_, WorldStage::kCandidates);
   for (std::vector<Incidence>& pairs : against_) pairs.clear();
@@ -455,25 +523,42 @@ void World::gather(int threads) {
     const auto [first, second] = near_[p];
     if (is_gathered_[p] || (at(first).asleep && at(second).asleep)) continue;
     is_gathered_[p] = true;
-    if (const std::span<const Link> links = links_of(near_[p]); !links.empty()) {
-      pairs_[p]->reset(first, second, nullptr);
-      for (const Link& link : links) pairs_[p]->attach(*link.attachment, link.side, touching(first), touching(second));
-      continue;
-    }
-    pairs_[p]->reset(first, second, held_of(first, second));
+    if (begin_pair(p, held_of(first, second))) continue;
     against_[static_cast<std::size_t>(second)].push_back({static_cast<int>(p), 0});
     if (first != second) against_[static_cast<std::size_t>(first)].push_back({static_cast<int>(p), 1});
   }
   for_all(bodies_.size(), threads, [this](std::size_t i) {
     if (against_[i].empty()) return;
-    WorldBody& other = touching(static_cast<int>(i));
-    if (!other.full) other.surface.place(other.state.q, other.shape);
+    const auto other = static_cast<int>(i);
+    if (!touching(other).full) touching(other).place_surface();
     for (const auto& [index, side] : against_[i]) {
       PairContact& pair = *pairs_[static_cast<std::size_t>(index)];
-      const int own = pair.body(side);
-      pair.gather(law_, side, touching(own), other, margin_between(own, static_cast<int>(i)));
+      gather_side(pair, side, pair.body(side), other);
     }
   });
+}
+
+/// True if the two are attached to each other, and do not touch then: contacts where the patches meet would work
+/// against the attachment.
+bool World::begin_pair(std::size_t pair, const HeldPair* held) {
+  const auto [first, second] = near_[pair];
+  pairs_[pair]->reset(first, second, nullptr);
+  for (const Link& link : links_of(near_[pair]))
+    if (link.attachment->holds()) pairs_[pair]->attach(*link.attachment, link.side, touching(first), touching(second));
+  if (!pairs_[pair]->attachments().empty()) return true;
+  pairs_[pair]->reset(first, second, held);
+  return false;
+}
+
+void World::gather_side(PairContact& pair, int side, int own, int other) {
+  pair.gather(law_, side, touching(own), touching(other), margin_between(own, other));
+}
+
+/// By their places in their island.
+void World::number_bodies(std::size_t pair) {
+  const auto [first, second] = near_[pair];
+  pairs_[pair]->number(place_in_island_[static_cast<std::size_t>(first)],
+                       place_in_island_[static_cast<std::size_t>(second)]);
 }
 
 /// True if the two bodies of a pair step together: they may touch or are attached, or they sleep like that.
@@ -526,6 +611,7 @@ void World::collect_islands() {
       fresh.bodies.clear();
       fresh.numbers.clear();
       fresh.pairs.clear();
+      fresh.near.clear();
       island_of_[root] = static_cast<int>(island_count_++);
     }
     const auto index = static_cast<std::size_t>(body);
@@ -552,7 +638,8 @@ void World::collect_islands() {
     Island& island = *islands_[static_cast<std::size_t>(island_of_[first])];
     const auto index = static_cast<int>(island.pairs.size());
     island.pairs.push_back(pairs_[p].get());
-    island.pairs.back()->number(place_in_island_[first], place_in_island_[second]);
+    island.near.push_back(p);
+    number_bodies(p);
     island.incidences[static_cast<std::size_t>(place_in_island_[first])].push_back({index, 0});
     if (first != second) island.incidences[static_cast<std::size_t>(place_in_island_[second])].push_back({index, 1});
   }

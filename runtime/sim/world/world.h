@@ -26,6 +26,7 @@ struct WorldReport {
   int islands = 0;         ///< groups of touching bodies, each solved together
   int largest_island = 0;  ///< bodies
   int unconverged_islands = 0;
+  int divided_islands = 0;    ///< taken in several smaller steps
   int newton_iterations = 0;  ///< most of an island
 };
 
@@ -150,6 +151,9 @@ class World {
   double margin_between(int own, int other) const noexcept;
   void keep_pairs();
   void gather(int threads);
+  bool begin_pair(std::size_t pair, const HeldPair* held);
+  void gather_side(PairContact& pair, int side, int own, int other);
+  void number_bodies(std::size_t pair);
   void make_islands(int threads);
   bool wake_islands();
   bool is_linked(std::size_t pair) const;
@@ -164,7 +168,6 @@ class World {
   void reserve_full(const BodyKind& kind);
   bool is_in_island(int body) const noexcept;
   void step_crowd(int threads, StepObserver* observer);
-  void step_islands(int threads, StepObserver* observer);
   void remember();
   const HeldPair* held_of(int first, int second) const;
 
@@ -172,10 +175,18 @@ class World {
     std::vector<WorldBody*> bodies;
     std::vector<int> numbers;  // of these bodies
     std::vector<PairContact*> pairs;
+    std::vector<std::size_t> near;                   // their numbers in near_
     std::vector<std::vector<Incidence>> incidences;  // of each body
+    std::vector<HeldPair> held;                      // of each pair, within a divided step
     IslandWorkspace workspace;
     NewtonReport newton;
+    bool divided = false;  // the step
   };
+
+  void gather_again(Island& island, bool at_start);
+  void step_islands(int threads, StepObserver* observer);
+  NewtonReport step_island(Island& island, int threads);
+  NewtonReport step_in_parts(Island& island, int threads);
 
   std::vector<std::unique_ptr<State>> owned_;
   std::vector<Member> bodies_;

@@ -24,15 +24,15 @@ struct BodyKind {
 struct WorldBody {
   WorldBody(const BodyKind& kind, State& its_state)
       : model(*kind.model),
-        scene(*kind.scene),
         touching(kind.surface),
         surface(kind.surface->surface),
         state(its_state),
-        workspace(model, scene, /*meets_bodies=*/true),
-        shape(surface.make_shape()) {}
+        workspace(model, *kind.scene, /*meets_bodies=*/true),
+        shape(surface.make_shape()),
+        whole_(kind.scene),
+        scene_(kind.scene) {}
 
   const Model& model;
-  const StepScene& scene;
   std::shared_ptr<const TouchingSurface> touching;
   const BodySurface& surface;
   State& state;
@@ -49,6 +49,13 @@ struct WorldBody {
   Placement placement;                                       ///< at the iterate
   Eigen::Index offset = 0;                                   ///< place of its unknowns in those of its island
 
+  const StepScene& scene() const noexcept { return *scene_; }
+  /// That of the parts of a divided step, or again its own: null.
+  void take_scene(const StepScene* part) {
+    scene_ = part != nullptr ? part : whole_;
+    if (full) full->fit(*scene_);
+  }
+
   ContactProblemWorkspace& near() noexcept { return *workspace.near; }
   const ContactProblemWorkspace& near() const noexcept { return *workspace.near; }
   const ContactSet& contact() const noexcept { return *model.contact; }
@@ -64,8 +71,15 @@ struct WorldBody {
   }
   /// At the iterate, of a body in full space.
   FullSide full_side() const { return {*full, full->surface(), placement}; }
+  /// Where the state says, for searches.
+  void place_surface() {
+    if (full)
+      full->place_surface();
+    else
+      surface.place(state.q, shape);
+  }
   SurfaceShape& placed_shape() noexcept { return full ? full->surface().shape() : shape; }
-  Energies energies() const noexcept { return full ? full->energies() : runtime::energies(model, scene, state); }
+  Energies energies() const noexcept { return full ? full->energies() : runtime::energies(model, scene(), state); }
   /// After a step: what it has is to be this share of it at most.
   void limit_kinetic_energy(double share) noexcept {
     if (!full)
@@ -89,6 +103,9 @@ struct WorldBody {
     return std::max(runtime::way_bound(contact().reach(), contact().tree().movement(), pose(), from, from_q),
                     runtime::way_bound(surface.reach(), surface.movement(), pose(), from, from_q));
   }
+
+ private:
+  const StepScene *whole_, *scene_;
 };
 
 }  // namespace exmat::runtime

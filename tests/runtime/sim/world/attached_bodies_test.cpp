@@ -5,6 +5,7 @@
 #include <complex>
 #include <functional>
 #include <gtest/gtest.h>
+#include <optional>
 
 #include "runtime/scene/attachment_loader.h"
 #include "tests/runtime/sim/world/touching_blocks.h"
@@ -365,6 +366,57 @@ TEST(AttachedBodies, MayBeHeldMoreThanOnce) {
   const test::Momenta end = test::momenta(blocks, world);
   EXPECT_LE((end.linear - start.linear).norm(), 1e-12 * start.linear.norm());
   EXPECT_LE((end.angular - start.angular).norm(), 1e-12 * start.angular.norm());
+}
+
+/// A clamped bar of 2 x 0.4 x 0.4 m, without weight, and a free one of `ratio` times its mass at its end.
+struct Hung {
+  Hung(double time_step, MaterialModel material, double youngs_modulus, double ratio, double gravity)
+      : bar(time_step, options(material, youngs_modulus, 1, false)),
+        heavy(time_step, options(material, youngs_modulus * ratio, ratio, true)) {
+    heavy.scene.gravity = Eigen::Vector3d(0, 0, -gravity);
+    world.emplace(
+        std::vector<WorldBodyStart>{WorldBodyStart{{bar.model.get(), &bar.scene, bar.surface}, make_state(*bar.model)},
+                                    heavy.body(Eigen::Vector3d(kReach, 0, 0))},
+        ContactLaw{.stiffness = 1e6});
+    prepare_contacts(*bar.model, 0, world->state(0));
+    attach(*world, {heavy, 1, kStart}, {bar, 0, kFarEnd}, AttachmentKind::kBall);
+  }
+
+  static exmat::test::BarOptions options(MaterialModel material, double youngs_modulus, double density, bool free) {
+    return {.cells = {10, 2, 2},
+            .lengths = {kReach, kWidth, kWidth},
+            .youngs_modulus = youngs_modulus,
+            .material = material,
+            .density = 1000 * density,
+            .free = free};
+  }
+
+  static constexpr double kReach = 2, kWidth = 0.4;
+  static inline const Select kFarEnd = [](const Eigen::Vector3d& x) { return x[0] > kReach - 1e-9; };
+  Blocks bar, heavy;
+  std::optional<World> world;
+};
+
+// A soft bar holds far heavier ones, whatever that makes of its end, which the load squeezes to a line: some steps have
+// no solution in one.
+TEST(AttachedBodies, HoldAThousandTimesTheirMass) {
+  int divided = 0;
+  for (const MaterialModel material : {MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean})
+    for (const double ratio : {10.0, 1000.0})
+      for (const double rate : {60.0, 240.0}) {
+        Hung hung(1 / rate, material, 1e5, ratio, 9.81);
+        double energy = hung.world->energies().total();
+        const double scale = hung.heavy.mass() * 9.81 * Hung::kReach;
+        for (int i = 0; i < 4 * rate; ++i) {
+          divided += hung.world->step(1).divided_islands;
+          ASSERT_EQ(hung.world->report(0).status & ~kStepDivided, 0U)
+              << ratio << ", " << rate << ": " << i / rate << " s";
+          const double now = hung.world->energies().total();
+          ASSERT_LE(now, energy + 1e-6 * scale) << ratio << ", " << rate << ": " << i / rate << " s";
+          energy = now;
+        }
+      }
+  EXPECT_GT(divided, 0);
 }
 
 TEST(AttachedBodies, AreLetGoWithTheOneThatIsTakenOut) {

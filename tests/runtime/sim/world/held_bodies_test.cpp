@@ -1,28 +1,11 @@
 #include <gtest/gtest.h>
 
-#include "runtime/sim/step/contact_step.h"
+#include "tests/runtime/sim/world/held_vertex.h"
 #include "tests/runtime/sim/world/touching_blocks.h"
 
 // Bodies in their modes that a host holds while they are carried, or lie on others.
 namespace exmat::runtime {
 namespace held_bodies_test {
-
-/// Holds one vertex in a frame at the origin.
-Attachment held_vertex(const Model& model, const test::Bar& bar, const State& state, Eigen::Index vertex,
-                       AttachmentKind kind) {
-  Attachment attachment;
-  attachment.kind = kind;
-  attachment.vertices = {static_cast<std::int32_t>(vertex)};
-  attachment.shares = Eigen::VectorXd::Ones(1);
-  const BodyPose pose = pose_of(model, state);
-  VertexArray rest = bar.model.object->mesh.vertices.row(vertex);
-  attachment.places = pose.to_world(rest.row(0).transpose());
-  rest.rowwise() -= model.frame->origin().transpose();
-  attachment.patch = reduce_patch(rest, bar.basis().middleRows<3>(3 * vertex), attachment.shares, attachment.places,
-                                  attachment.kind == AttachmentKind::kFixed);
-  attachment.mean = attachment.mean_before = mean_of(attachment, pose);
-  return attachment;
-}
 
 TEST(HeldBody, ThatIsCarriedIsHeldBesideWhatCarriesIt) {
   const test::Bar bar = test::make_bar({.youngs_modulus = 1e6, .carried = true});
@@ -38,7 +21,7 @@ TEST(HeldBody, ThatIsCarriedIsHeldBesideWhatCarriesIt) {
   follow_frame(*model, scene, state, workspace);
   Eigen::Index tip = 0;
   bar.model.object->mesh.vertices.col(0).maxCoeff(&tip);
-  state.attachments.push_back(held_vertex(*model, bar, state, tip, AttachmentKind::kFixed));
+  state.attachments.push_back(test::held_vertex(*model, bar, state, tip, AttachmentKind::kFixed));
   workspace.fit(*model, scene, state.attachments);
   const Eigen::Vector3d place = state.attachments[0].places.col(0);
   double pulled = 0;
@@ -64,7 +47,7 @@ TEST(HeldBody, ThatLiesOnAnotherPullsAtItsSpring) {
   Eigen::Index top = 0;
   blocks.bar.model.object->mesh.vertices.rowwise().sum().maxCoeff(&top);
   State& upper = world.state(1);
-  upper.attachments.push_back(held_vertex(*blocks.model, blocks.bar, upper, top, AttachmentKind::kSpring));
+  upper.attachments.push_back(test::held_vertex(*blocks.model, blocks.bar, upper, top, AttachmentKind::kSpring));
   upper.attachments[0].stiffness = 2000;
   upper.attachments[0].damping = 10;
   world.fit_attachments(1);
