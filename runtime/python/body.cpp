@@ -103,8 +103,11 @@ void take_weights(BodyObject& body, const py::object& weights, const py::object&
 
 // ---- copies
 
+/// Of a body in a world without its attachments: a copy is in none.
 py::tuple kept(BodyObject& body) {
-  return py::make_tuple(body.model.object(), state_of(body), kept_settings(body), kept_obstacles(obstacles_of(body)));
+  py::object state = py::cast(state_of(body));
+  if (!body.world) state = snapshot_of(body.get().world());
+  return py::make_tuple(body.model.object(), state, kept_settings(body), kept_obstacles(obstacles_of(body)));
 }
 
 Shared restored(const py::tuple& from) {
@@ -112,6 +115,10 @@ Shared restored(const py::tuple& from) {
   const auto obstacles = from[3].cast<py::dict>();
   set_settings(*body, from[2].cast<py::tuple>());
   set_obstacles(obstacles_of(*body), obstacles);
+  if (py::isinstance<py::bytes>(from[1])) {
+    set_snapshot(body->get().world(), from[1].cast<py::bytes>());
+    return body;
+  }
   set_state(*body, from[1].cast<StateObject>());
   set_obstacle_motions(obstacles_of(*body), obstacles);
   return body;
@@ -139,7 +146,9 @@ void bind_stepping(BodyClass& type) {
       .def("set_reduced", &set_reduced, py::arg("q"), py::arg("v"),
            "As reset(), with the displacement `q` and velocity `v`, shapes (r,).")
       .def(
-          "reset", [](BodyObject& body) { body.get().reset(); }, "Back to its start at time 0, without applied forces.")
+          "reset", [](BodyObject& body) { body.get().reset(); },
+          "Back to its start at time 0, without applied forces and the attachments that a host has made; those of the "
+          "scene hold as at its start.")
       .def_property(
           "motion", [](BodyObject& body) { return body.get().motion(); },
           [](BodyObject& body, const exmat_motion& motion) { body.get().set_motion(motion); },

@@ -1,5 +1,8 @@
 #include <array>
+#include <cstring>
 #include <pybind11/stl.h>
+#include <string_view>
+#include <vector>
 
 #include "runtime/python/objects.h"
 
@@ -59,6 +62,20 @@ void set_settings(BodyObject& body, const py::tuple& kept) {
   if (const auto group = kept[5].cast<std::optional<std::array<std::uint32_t, 2>>>())
     set_group(body, (*group)[0], (*group)[1]);
   if (const auto space = kept[6].cast<std::optional<std::int32_t>>()) set_space(body, *space);
+}
+
+py::bytes snapshot_of(const WorldRef& world) {
+  const std::size_t size = exmat_world_snapshot_size(world.get());
+  std::vector<double> numbers(size / sizeof(double));
+  check(exmat_world_save(world.get(), numbers.data(), size));
+  return {reinterpret_cast<const char*>(numbers.data()), size};
+}
+
+void set_snapshot(WorldRef world, const py::bytes& snapshot) {
+  const auto bytes = static_cast<std::string_view>(snapshot);
+  std::vector<double> numbers((bytes.size() + sizeof(double) - 1) / sizeof(double) + 1);
+  std::memcpy(numbers.data(), bytes.data(), bytes.size());
+  check(exmat_world_restore(world.get(), numbers.data(), bytes.size()));
 }
 
 void bind_states(py::module_& module) { bind_state(module); }

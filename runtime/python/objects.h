@@ -216,6 +216,10 @@ void set_state(BodyObject& body, const StateObject& state);
 py::tuple kept_settings(BodyObject& body);
 void set_settings(BodyObject& body, const py::tuple& kept);
 
+/// All that steps and a host have changed in a world, and back into one of the same bodies and obstacles.
+py::bytes snapshot_of(const WorldRef& world);
+void set_snapshot(WorldRef world, const py::bytes& snapshot);
+
 /// The world of a body or of a world object, and its obstacles.
 struct ObstacleAccess {
   WorldRef world;

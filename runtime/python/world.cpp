@@ -224,20 +224,11 @@ void set_state(WorldObject& world, const WorldStateObject& state) {
 
 namespace {
 
-py::bytes save(WorldObject& world) {
-  const exmat_world* const own = world.get().get();
-  const std::size_t size = exmat_world_snapshot_size(own);
-  std::vector<double> numbers(size / sizeof(double));
-  check(exmat_world_save(own, numbers.data(), size));
-  return {reinterpret_cast<const char*>(numbers.data()), size};
-}
+py::bytes save(WorldObject& world) { return snapshot_of(world.get()); }
 
 void restore(WorldObject& world, const py::bytes& snapshot) {
   for (const auto& [id, body] : world.bodies) body->get();
-  const auto bytes = static_cast<std::string_view>(snapshot);
-  std::vector<double> numbers((bytes.size() + sizeof(double) - 1) / sizeof(double) + 1);
-  std::memcpy(numbers.data(), bytes.data(), bytes.size());
-  check(exmat_world_restore(world.get().get(), numbers.data(), bytes.size()));
+  set_snapshot(world.get(), snapshot);
 }
 
 }  // namespace
@@ -256,7 +247,7 @@ py::dict kept_world(WorldObject& world) {
   result["next"] = world.next_id;
   result["bodies"] = bodies;
   result["obstacles"] = kept_obstacles(obstacles_of(world));
-  result["state"] = state_of(world);
+  result["snapshot"] = save(world);
   return result;
 }
 
@@ -297,8 +288,7 @@ void restore_world(WorldObject& world, const py::dict& kept) {
   restore_bodies(world, bodies);
   if (!world.bodies.empty()) skip_ids(world, kept["next"].cast<std::int64_t>(), world.bodies.begin()->second->model);
   set_obstacles(obstacles_of(world), obstacles);
-  set_state(world, kept["state"].cast<const WorldStateObject&>());
-  set_obstacle_motions(obstacles_of(world), obstacles);
+  restore(world, kept["snapshot"].cast<py::bytes>());
 }
 
 WorldClass bind_world(py::module_& module) {
@@ -361,7 +351,9 @@ WorldClass bind_world(py::module_& module) {
           "energies", [](WorldObject& world) { return world.get().energies(); }, "Of all bodies together.")
       .def_property_readonly(
           "state_hash", [](WorldObject& world) { return world.get().hash(); }, "As state_hash(world.bodies).")
-      .def("reset", &reset_world, "All bodies back to their start at time 0, without applied forces.")
+      .def("reset", &reset_world,
+           "All bodies back to their start at time 0, without applied forces and the attachments that a host has made; "
+           "those of the scene hold as at its start.")
       .def_property_readonly(
           "time", [](WorldObject& world) { return world.get().time(); }, "That of all its bodies [s].")
       .def_property(

@@ -16,12 +16,28 @@ namespace exmat::runtime {
 namespace {
 
 constexpr std::size_t kListed = 6;  // vertices in a message
+constexpr double kStiffest = 1e9;   // of springs, times the mass that they hold over the square of the time step
 
 /// The first few of them.
 std::string list_of(const std::vector<std::int32_t>& vertices) {
   const auto shown = std::min<std::size_t>(vertices.size(), kListed);
   return fmt::format("{}{}", fmt::join(vertices.begin(), vertices.begin() + static_cast<std::ptrdiff_t>(shown), ", "),
                      shown < vertices.size() ? ", ..." : "");
+}
+
+/// None where the spring and the damper of an attachment keep their digits beside the inertia of a mass that they hold.
+std::optional<HoldFault> too_stiff(double mass, const StepScene& scene, const Attachment& attachment) {
+  if (attachment.kind != AttachmentKind::kSpring) return std::nullopt;
+  const double per_step = kStiffest * mass / scene.time_step, stiffest = per_step / scene.time_step;
+  const auto expected = [](double most, const char* unit, const char* what) {
+    return fmt::format("<= {:.3g} {}, {:g} times the mass of the vertices over {}: kind ball holds exactly", most, unit,
+                       kStiffest, what);
+  };
+  if (attachment.stiffness > stiffest)
+    return HoldFault{"stiffness", expected(stiffest, "N/m", "time_step^2"), fmt::format("{:g}", attachment.stiffness)};
+  if (attachment.damping > per_step)
+    return HoldFault{"damping", expected(per_step, "N s/m", "time_step"), fmt::format("{:g}", attachment.damping)};
+  return std::nullopt;
 }
 
 /// Reason why the k-th vertex cannot be held; none where it can.
@@ -110,8 +126,12 @@ std::optional<HoldFault> hold(const Model& model, const FullModel* full, const S
   if (in_modes && may_touch && attachment.kind != AttachmentKind::kSpring)
     return HoldFault{"kind", "spring, or space full or auto: bodies that may touch others are held so in their modes",
                      std::string(name_of(attachment.kind))};
-  for (std::size_t k = 0; k < patch.vertices.size(); ++k)
+  double mass = in_modes ? patch.masses.sum() : 0;
+  for (std::size_t k = 0; k < patch.vertices.size(); ++k) {
     if (auto fault = fault_of(full, in_modes, patch, k, state)) return fault;
+    if (!in_modes) mass += full->space.masses()[full->space.place(patch.vertices[k])];
+  }
+  if (auto fault = too_stiff(mass, scene, attachment)) return fault;
   attachment.vertices = patch.vertices;
   if (!in_modes)
     hold_in_full(model, *full, patch, attachment, state);
@@ -131,6 +151,8 @@ std::optional<HoldFault> hold_together(const End& own, const End& other, int bod
       return HoldFault{"to", "two bodies that may touch others: bodies of one world or of a scene's \"bodies\"",
                        "one that touches obstacles alone"};
   }
+  for (const End* const end : {&own, &other})
+    if (auto fault = too_stiff(end->patch.masses.sum(), end->scene, attachment)) return fault;
   OtherEnd held{body, other.patch.vertices, {}, {}};
   Attachment others;
   held.patch = take_hold_in_modes(other.model, other.patch, other.state, true, others);

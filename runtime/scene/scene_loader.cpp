@@ -212,7 +212,14 @@ StepScene step_scene(const SceneConfig& config, const Obstacles& obstacles, Load
                  {config.space.newton.max_iterations, config.space.newton.tolerance}};
   scene.meeting = config.meeting;
   scene.obstacles = obstacles_of(config.meeting, obstacles);
-  if (loaded.model->skeleton) scene.space.space = Space::kFull;
+  if (loaded.model->skeleton) {
+    if (config.space.space == Space::kAuto)
+      log::warning(
+          fmt::format("{}, {}/space: \"auto\": a body on bones, or whose clamp follows examples, steps in all "
+                      "its vertices in every step; \"full\" says so",
+                      config.file.string(), config.place));
+    scene.space.space = Space::kFull;
+  }
   scene.animation = bone_play(config, loaded);
   if (!config.body.motion.empty()) scene.carrier = make_motion(config.body.motion);
   scene.gravity = config.gravity;

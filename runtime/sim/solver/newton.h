@@ -33,7 +33,7 @@ enum class NewtonBegin { kHessian, kFactor };
 enum class NewtonStatus {
   kConverged,
   kIterationLimit,
-  kStagnated,  ///< no lower value along the direction, or all of the decrease below rounding
+  kStagnated,   ///< no lower value along the direction, or all of the decrease below rounding
   kNonFinite,   ///< x may hold anything
   kAboveStart,  ///< a minimum that lies above where the bodies stand, which is none of theirs
 };

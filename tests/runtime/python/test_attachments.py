@@ -1,4 +1,7 @@
 """Bodies that frames of their host hold."""
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -218,11 +221,16 @@ def test_bodies_are_tied_to_each_other(free_bundle):
     world.remove(0)
 
 
-def test_patches_in_a_line_are_named(free_bundle):
-    model = exmat.Model(free_bundle, use_contact=True)
+def test_ties_that_rounding_would_move_are_refused(free_bundle):
+    model = exmat.Model(free_bundle, time_step=0.004, use_contact=True)
     world, bodies = exmat.World(), [exmat.Body(model), exmat.Body(model)]
     for body in bodies:
         world.add(body)
+    for given, words in (({"stiffness": 1e22}, "stiffness: 1e\\+22: expected <="), ({"damping": 1e22}, "damping: 1e\\+22: expected <=")):
+        with pytest.raises(exmat.InvalidArgument, match=words):
+            bodies[0].attach_to([0, 1, 2], bodies[1], [0, 1, 2], kind="spring", **given)
+        with pytest.raises(exmat.InvalidArgument, match=words):
+            bodies[0].attach([0, 1, 2], frame_at([0, 0, 0]), kind="spring", **given)
     with pytest.raises(exmat.InvalidArgument, match="to/vertices: 2 in a line: 0, 1"):
         bodies[0].attach_to(end_of(model)[0], bodies[1], [0, 1], kind="fixed")
 
@@ -238,3 +246,54 @@ def test_bodies_that_touch_obstacles_alone_are_not_tied(free_bundle):
     body = exmat.Body(exmat.Model(free_bundle))
     with pytest.raises(exmat.InvalidArgument, match="same world"):
         body.attach_to([60], exmat.Body(exmat.Model(free_bundle)), [60])
+
+
+def duplicates(thing):
+    return [copy.copy(thing), copy.deepcopy(thing), pickle.loads(pickle.dumps(thing))]
+
+
+def test_copies_of_a_body_are_held_as_it_is(hung):
+    vertices, xyz = end_of(hung)
+    body = exmat.Body(hung)
+    held = body.attach(vertices, frame_at(xyz.mean(0)), kind="ball")
+    body.step(20)
+    for other in duplicates(body):
+        twin = copy.copy(body)
+        for moved in (other, twin):
+            moved.move_attachment(held, frame_at(xyz.mean(0) + [0, 0, 0.01]))
+            moved.step(30)
+        assert exmat.state_hash([other]) == exmat.state_hash([twin]) != exmat.state_hash([body])
+        for loads in zip(other.attachment_load(held), twin.attachment_load(held)):
+            np.testing.assert_array_equal(*loads)
+        other.detach(held)
+    body.attachment_load(held)
+
+
+def test_copies_of_a_world_have_its_ties(free_bundle):
+    model = exmat.Model(free_bundle, time_step=0.004, use_contact=True, gravity=(0, 0, -10))
+    world, bodies = exmat.World(), [exmat.Body(model), exmat.Body(model)]
+    for body in bodies:
+        world.add(body)
+    vertices, xyz = end_of(model)
+    world[0].attach(vertices, frame_at(xyz.mean(0)), kind="spring", stiffness=1e5)
+    tie = world[1].attach_to(vertices, world[0], vertices, kind="ball", break_force=1e9)
+    world.step(20)
+    for other in duplicates(world):
+        twin = copy.copy(world)
+        other.step(30)
+        twin.step(30)
+        assert other.state_hash == twin.state_hash != world.state_hash
+        assert other[1].attachment_load(tie)[0].any()
+        other[1].detach(tie)
+    world[1].attachment_load(tie)
+    with pytest.raises(exmat.InvalidArgument):  # a copy of a body of a world is in none, and held by nothing
+        copy.copy(world[1]).attachment_load(tie)
+
+
+def test_a_reset_leaves_the_attachments_of_the_host(hung):
+    vertices, xyz = end_of(hung)
+    body = exmat.Body(hung)
+    held = body.attach(vertices, frame_at(xyz.mean(0)))
+    body.reset()
+    with pytest.raises(exmat.InvalidArgument):
+        body.attachment_load(held)
