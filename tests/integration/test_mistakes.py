@@ -115,7 +115,9 @@ class Case:
         for name, text in self.files.items():
             files[name] = text(files[name]) if callable(text) else text
         for name, text in files.items():
-            if text is not None:
+            if isinstance(text, bytes):
+                (folder / name).write_bytes(text)
+            elif text is not None:
                 (folder / name).write_text(text)
 
     def run(self):
@@ -298,9 +300,74 @@ def assets(draw):
         yield Case("a landmark that is no vertex", (REFUSED,), "landmarks.txt", pose=pose, files={"landmarks.txt": text(beyond)}, edit=landmarks())
 
 
+def spellings(_draw):
+    """The same numbers as other programs write them."""
+    commas = lambda text: text.replace(".", ",")
+    in_capitals = lambda asset: {**asset, "object": {**asset["object"], "mesh": "OBJECT.VEG"}}
+    renamed = lambda *names: lambda asset: {**asset, "examples": [{**e, "name": name} for e, name in zip(asset["examples"], names)]}
+    for name in ("object.veg", "rest.veg", "pose.veg", "asset.json"):
+        if name != "asset.json":
+            yield Case("a byte order mark, or other line ends", (RIGHT,), files={name: lambda text: text.replace("\n", "\r").encode()})
+            yield Case("decimal commas", (REFUSED,), name.replace(".", r"\."), files={name: commas})
+        yield Case("a byte order mark, or other line ends", (RIGHT,), files={name: lambda text: text.encode("utf-8-sig")})
+        yield Case("a byte order mark, or other line ends", (RIGHT,), files={name: lambda text: text.replace("\n", "\r\n").encode()})
+        yield Case("UTF-16", (REFUSED,), "UTF-16", files={name: lambda text: text.encode("utf-16")})
+    yield Case("an ending in capitals", (RIGHT,), files={"object.veg": None, "OBJECT.VEG": body().text()}, edit=in_capitals)
+    for rest in ("\0", "\0garbage", "{}", "x"):
+        yield Case("something after the asset", (REFUSED,), "asset.json", files={"asset.json": lambda text, rest=rest: text + rest})
+    for name in ("a/b", "..", ".", "x" * 65, "tab\t", ""):
+        yield Case("a name that HDF5 cannot have", (REFUSED,), "/examples/1/name", edit=renamed("rest", name))
+    gmsh_1 = "$NOD\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$ENDNOD\n$ELM\n1\n1 4 1 1 4 1 2 3 4\n$ENDELM\n"
+    as_gmsh = lambda asset: {**asset, "object": {**asset["object"], "mesh": "object.msh"}}
+    yield Case("Gmsh 1", (REFUSED,), "gmsh .*-format", files={"object.msh": gmsh_1}, edit=as_gmsh)
+    corners = "".join(f"{k + 1} {k & 1} {k >> 1 & 1} {k >> 2}\n" for k in range(8))
+    for kind, cell, count in (("hexahedra", 5, 8), ("prisms", 6, 6), ("pyramids", 7, 5)):
+        numbers = " ".join(map(str, [1, 2, 4, 3, 5, 6, 8, 7][:count]))
+        mesh = f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n8\n{corners}$EndNodes\n$Elements\n1\n1 {cell} 2 1 1 {numbers}\n$EndElements\n"
+        yield Case("cells that are no tets", (REFUSED,), kind[:5], files={"object.msh": mesh}, edit=as_gmsh)
+    for ending, told in ((".fbx", "fbx"), (".npz", "npz"), (".stp", "stp"), ("", "no extension")):
+        foreign = lambda asset, ending=ending: {**asset, "object": {**asset["object"], "mesh": "object" + ending}}
+        yield Case("a format that is not read", (REFUSED,), told, files={"object" + ending: "x"}, edit=foreign)
+
+
+def surfaces(draw):
+    """Surfaces of a block with a notch, whose faces are polygons: its volume is 14, that of a mesh by other corners is not."""
+    outline = [(0, 0), (4, 0), (4, 4), (3, 4), (3, 1.5), (1, 1.5), (1, 4), (0, 4)]
+    count = len(outline)
+
+    def text(first=0, extra="", number=lambda x: f"{x:.6f}"):
+        points = [(x, y, z) for z in (0, 1) for x, y in outline]
+        turned = [(k + first) % count for k in range(count)]
+        faces = [[k + 1 for k in reversed(turned)], [count + k + 1 for k in turned]]
+        faces += [[k + 1, (k + 1) % count + 1, count + (k + 1) % count + 1, count + k + 1] for k in range(count)]
+        lines = ["v " + " ".join(number(x) for x in point) for point in points]
+        return "\n".join(lines + [extra] + ["f " + " ".join(map(str, face)) for face in faces]) + "\n"
+
+    def asset_of(file, **members):
+        own = {"surface": file, "cells": 200, "material": {"youngs_modulus": 1e6, "poisson_ratio": 0.3, "density": 1000}, **members}
+        return lambda _asset: {"name": "case", "object": own}
+
+    for first in range(count):
+        yield Case("polygons that are not convex", (RIGHT,), files={"object.obj": text(first)}, edit=asset_of("object.obj"))
+    for _ in range(2):
+        stray = f"v {draw.uniform(20, 90):.3f} 0 0"
+        yield Case("an unused vertex of a surface", (RIGHT, WARNED), "vert", files={"object.obj": text(extra=stray)}, edit=asset_of("object.obj"))
+    yield Case("decimal commas", (REFUSED,), "decimal points", files={"object.obj": text(number=lambda x: f"{x:.6f}".replace(".", ","))},
+               edit=asset_of("object.obj"))
+    yield Case("an ending in capitals", (RIGHT,), files={"OBJECT.OBJ": text()}, edit=asset_of("OBJECT.OBJ"))
+    yield Case("a byte order mark, or other line ends", (RIGHT,), files={"object.obj": text().encode("utf-8-sig")}, edit=asset_of("object.obj"))
+    yield Case("a byte order mark, or other line ends", (RIGHT,), files={"object.obj": text().replace("\n", "\r").encode()}, edit=asset_of("object.obj"))
+    yield Case("UTF-16", (REFUSED,), "UTF-16", files={"object.obj": text().encode("utf-16")}, edit=asset_of("object.obj"))
+    yield Case("centimetres", (WARNED,), "object.unit", files={"object.obj": text(number=lambda x: f"{100 * x:.6f}")}, edit=asset_of("object.obj"))
+    yield Case("centimetres that are said", (RIGHT,), files={"object.obj": text(number=lambda x: f"{100 * x:.6f}")}, edit=asset_of("object.obj", scale=0.01))
+    for ending in (".fbx", ".npz", ".blend"):
+        yield Case("a format that is not read", (REFUSED,), ending[1:], files={"object" + ending: "x"}, edit=asset_of("object" + ending))
+
+
 def cases():
     draw = random.Random(1)
-    return [case for group in (scales, frames, parts, topology, malformed, assets) for case in group(draw)]
+    groups = (scales, frames, parts, topology, malformed, assets, spellings, surfaces)
+    return [case for group in groups for case in group(draw)]
 
 
 def main():
