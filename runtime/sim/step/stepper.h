@@ -11,8 +11,8 @@
 namespace exmat::runtime {
 
 /// Advances a body by one time step: qddot + (alpha I + beta K) qdot + f_int(q) = f_ext + f_example, for a free body
-/// with the forces of its rotation, near obstacles with those of its contacts.  No allocation, no
-/// exception. docs/step_in_detail.md.
+/// with the forces of its rotation, near obstacles with those of its contacts. A step that has no solution is taken in
+/// parts (DividedStep), which allocates; else no allocation, no exception. docs/step_in_detail.md.
 StepReport step(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept;
 
 /// After q or v of `state` were set: what its frame carries follows (BodyFrame::follow).
