@@ -103,7 +103,7 @@ void take_weights(BodyObject& body, const py::object& weights, const py::object&
 
 // ---- copies
 
-/// Of a body in a world without its attachments: a copy is in none.
+/// A body in a world is kept without its attachments, as a copy is in none.
 py::tuple kept(BodyObject& body) {
   py::object state = py::cast(state_of(body));
   if (!body.world) state = snapshot_of(body.get().world());

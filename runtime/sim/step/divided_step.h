@@ -18,20 +18,20 @@ bool has_no_solution(const NewtonReport& newton, const NewtonSettings& settings)
 /// docs/step_in_detail.md, "Steps without a solution".
 class DividedStep {
  public:
-  /// Of a body that the step has not changed yet, and that does not hang on bones.
+  /// The step has not changed the body yet, and the body does not hang on bones.
   DividedStep(const StepScene& scene, State& state) : whole_(scene), state_(state), start_(state) {}
 
   /// Puts the body back to the start of the step, which has so many parts; in one it is whole again.
   void begin(int parts);
-  /// That of the parts.
+  /// Returns the scene of the parts, or that of the whole step where there is one part.
   const StepScene& scene() const noexcept { return part_ ? *part_ : whole_; }
 
-  /// Before each part: frames that a host moves go evenly through the step.
+  /// Moves frames of a host evenly through the step; called before each part.
   void begin_part(int part) noexcept;
-  /// After each of them.
+  /// Adds the report of a part, after it.
   void end_part(const StepReport& report) noexcept;
 
-  /// After all of them: the body is that of one step, and the report of all.
+  /// Makes the body that of one step, after all parts, and returns the report of all.
   StepReport end() noexcept;
 
  private:
@@ -43,7 +43,7 @@ class DividedStep {
   int parts_ = 1;
 };
 
-/// The numbers of parts that are tried.
+/// A step is tried in so many parts.
 inline constexpr std::array kStepParts{4, 16};
 
 /// Calls begin(parts), then take(part) of each, which returns its StepStatus: in as few parts as have solutions, in the

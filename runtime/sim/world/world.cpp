@@ -381,7 +381,7 @@ NewtonReport World::step_in_parts(Island& island, int threads) {
     sum = {};
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       steps[i].begin(parts);
-      bodies[i]->take_scene(parts > 1 ? &steps[i].scene() : nullptr);
+      bodies[i]->take_scene(steps[i].scene());
       bodies[i]->anew = anew[i];
     }
   };
@@ -404,7 +404,7 @@ NewtonReport World::step_in_parts(Island& island, int threads) {
   if (!divided) take(0);
   for (std::size_t i = 0; divided && i < bodies.size(); ++i) {
     bodies[i]->report = steps[i].end();
-    bodies[i]->take_scene(nullptr);
+    bodies[i]->take_scene(steps[i].scene());
   }
   return sum;
 }
@@ -554,7 +554,7 @@ void World::gather_side(PairContact& pair, int side, int own, int other) {
   pair.gather(law_, side, touching(own), touching(other), margin_between(own, other));
 }
 
-/// By their places in their island.
+/// Numbers the bodies of a pair by their places in their island.
 void World::number_bodies(std::size_t pair) {
   const auto [first, second] = near_[pair];
   pairs_[pair]->number(place_in_island_[static_cast<std::size_t>(first)],

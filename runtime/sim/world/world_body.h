@@ -29,7 +29,6 @@ struct WorldBody {
         state(its_state),
         workspace(model, *kind.scene, /*meets_bodies=*/true),
         shape(surface.make_shape()),
-        whole_(kind.scene),
         scene_(kind.scene) {}
 
   const Model& model;
@@ -50,10 +49,10 @@ struct WorldBody {
   Eigen::Index offset = 0;                                   ///< place of its unknowns in those of its island
 
   const StepScene& scene() const noexcept { return *scene_; }
-  /// That of the parts of a divided step, or again its own: null.
-  void take_scene(const StepScene* part) {
-    scene_ = part != nullptr ? part : whole_;
-    if (full) full->fit(*scene_);
+  /// Later steps are of this scene, its own or that of the parts of a divided step.
+  void take_scene(const StepScene& scene) {
+    scene_ = &scene;
+    if (full) full->fit(scene);
   }
 
   ContactProblemWorkspace& near() noexcept { return *workspace.near; }
@@ -71,7 +70,7 @@ struct WorldBody {
   }
   /// At the iterate, of a body in full space.
   FullSide full_side() const { return {*full, full->surface(), placement}; }
-  /// Where the state says, for searches.
+  /// Puts the surface where the state says, for searches.
   void place_surface() {
     if (full)
       full->place_surface();
@@ -105,7 +104,7 @@ struct WorldBody {
   }
 
  private:
-  const StepScene *whole_, *scene_;
+  const StepScene* scene_;
 };
 
 }  // namespace exmat::runtime

@@ -11,7 +11,7 @@ using test::Meeting;
 
 constexpr int kParts = 4;
 
-/// Two bars that fly into each other, flush and at a thirtieth of a length in each step of the second.
+/// Two bars that fly into each other flush, each by five sixths of its length in a step.
 constexpr Meeting kFlush{3e3, 50, 1e6, 1.0 / 60, false, 1, 0};
 /// The same beside each other, with friction and damping.
 constexpr Meeting kBeside{3e3, 50, 1e8, 1.0 / 60, true, 1, 1};
@@ -88,7 +88,7 @@ TEST(DividedSteps, TakeFramesOfAHostAlong) {
   expect_near(own.force, other.force);
 }
 
-/// Soft blocks that fall on a hard floor at two thirds of their length a step.
+/// Soft blocks that fall on a hard floor by five sixths of their length in a step.
 std::vector<WorldBodyStart> fallen(const test::Blocks& blocks, int count) {
   std::vector<WorldBodyStart> bodies;
   for (int i = 0; i < count; ++i)
