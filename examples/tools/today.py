@@ -9,7 +9,7 @@ from pathlib import Path
 
 STUDIES = Path(__file__).resolve().parents[2] / "docs/studies"
 ROWS = {
-    "recommended assets": ("accuracy.md", r"^\| [a-z-]+ \| .* \| ([\d.]+) % \| \d+ \|$"),
+    "recommended assets": ("accuracy.md", r"^\| [a-z-]+ \| \d+ \| .* \| ([\d.]+) % \|$"),
     "hands in the modes": ("hands.md", r"^\| .* \| `reduced` \| ([\d.]+) % "),
     "hands in space auto": ("hands.md", r"^\| .* \| `auto` \| ([\d.]+) % "),
     "learned loads": ("other_loads.md", r"^\| the scene \| [\d.]+ % \| ([\d.]+) % "),

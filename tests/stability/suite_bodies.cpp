@@ -68,7 +68,6 @@ std::vector<std::pair<std::string, TetMesh>> example_meshes(BodyExamples example
 AssetConfig asset_of(const BodySpec& spec) {
   AssetConfig asset;
   asset.name = "bar";
-  asset.formulation = Formulation::kLinear;  // whose limits are known
   asset.material = {spec.material, spec.youngs_modulus, spec.poisson_ratio, spec.density};
   if (!spec.free) asset.fixed = BoxSelection{{-1e-6, -1, -1}, {1e-6, 1, 1}};
   asset.eigenfunctions = kEigenfunctions;

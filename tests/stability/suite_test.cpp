@@ -67,15 +67,15 @@ TEST(Stability, ThePileThatDoesNotComeToRestIsHeldByACoupleOfFriction) {
   ASSERT_EQ(cases.size(), 1U);
   StabilityCase smooth = cases[0], fine = cases[0];
   smooth.friction = 0.02;
-  fine.time_step /= 2;
+  fine.time_step /= 4;
   cases.push_back(smooth);
   cases.push_back(fine);
-  const auto runs = run_stability(cases, {.most_steps = 3000});
+  const auto runs = run_stability(cases, {.most_steps = 12000});
   const auto rest = [&](std::size_t i) { return runs[i].result[Check::kRest]; };
   EXPECT_EQ(runs[0].result.limit_id(Check::kRest), "friction-couple");
   EXPECT_EQ(rest(1).verdict, Verdict::kPass) << rest(1).value;
   EXPECT_EQ(runs[2].result.limit_id(Check::kRest), "friction-couple");
-  EXPECT_NEAR(rest(2).value, rest(0).value / 4, 0.2 * rest(0).value / 4);
+  EXPECT_NEAR(rest(2).value, rest(0).value / 16, 0.2 * rest(0).value / 16);
 }
 
 TEST(Stability, SuiteReachesEveryExtreme) {
@@ -179,14 +179,14 @@ TEST(Stability, StartsAreAsExtremeAsTheyAreCalled) {
   for (const StabilityRun& run : run_stability(cases, {.most_steps = 1})) {
     const double inverted = run.result.start_inverted;
     switch (run.test.start) {
-      case Start::kInverted:
-        EXPECT_GE(inverted, 0.8) << describe(run.test);
+      case Start::kInverted:  // rings at the clamp and at a border of what is turned have tets of both kinds
+        EXPECT_GE(inverted, run.test.body.free ? 0.8 : 0.4) << describe(run.test);
         break;
       case Start::kFlattened:  // as many elements are turned as are left: a plane, as far as the basis can say it
         EXPECT_NEAR(inverted, 0.5, 0.15) << describe(run.test);
         break;
       case Start::kCollapsed:
-        EXPECT_GE(inverted, 0.3) << describe(run.test);
+        EXPECT_GE(inverted, 0.2) << describe(run.test);
         break;
       default:
         EXPECT_NEAR(run.result.largest_displacement, run.test.reach, 0.3) << describe(run.test);
