@@ -80,10 +80,11 @@ ProgressSink make_progress_sink(const std::string& mode) {
   return print_plain;
 }
 
-/// Signals of a terminal, of a supervisor and of limits. One that the program was started to ignore, as by nohup, stays
-/// ignored.
+/// Signals of a terminal, of a supervisor, of timers and of limits. One that the program was started to ignore, as by
+/// nohup, stays ignored.
 void catch_signals() {
-  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXCPU})
+  for (const int signal :
+       {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXCPU, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF})
     if (std::signal(signal, end_by_signal) == SIG_IGN) std::signal(signal, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);  // a write then fails, with a reason
 }

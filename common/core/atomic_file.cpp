@@ -79,9 +79,15 @@ std::filesystem::path folder_of(const std::filesystem::path& target) {
   return target.has_parent_path() ? target.parent_path() : std::filesystem::path(".");
 }
 
+// Of the name of a temporary file: the target's, as much of it as leaves room for the rest.
+std::string beginning_of(const std::filesystem::path& target) {
+  constexpr std::size_t kMost = 128;
+  return target.filename().string().substr(0, kMost);
+}
+
 // A file that cannot be listed or removed stays: it is in nobody's way.
 void remove_left_behind(const std::filesystem::path& target) {
-  const std::string prefix = target.filename().string() + own_prefix();
+  const std::string prefix = beginning_of(target) + own_prefix();
   std::error_code error;
   for (std::filesystem::directory_iterator entry(folder_of(target), error), end; !error && entry != end;
        entry.increment(error))
@@ -158,8 +164,7 @@ AtomicFile::AtomicFile(std::filesystem::path target) : target_(std::move(target)
   check_target(file_);
   remove_left_behind(file_);
   for (int attempt = 0; attempt < kNameAttempts; ++attempt) {
-    temporary_ = file_;
-    temporary_ += own_suffix();
+    temporary_ = folder_of(file_) / (beginning_of(file_) + own_suffix());
     slot_ = add_pending(temporary_, target_);
     const Descriptor descriptor(temporary_, O_WRONLY | O_CREAT | O_EXCL);
     const int error_number = errno;

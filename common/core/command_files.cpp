@@ -96,6 +96,13 @@ void claim_output(const std::filesystem::path& file, const std::string& role) {
   registry().outputs.push_back({identity, file, role});
 }
 
+void claim_folder(const std::filesystem::path& folder, const std::string& role) {
+  std::error_code ignored;
+  if (std::filesystem::exists(folder, ignored) && !std::filesystem::is_directory(folder, ignored))
+    throw InputError({folder.string(), role, "a folder, or the name of a new one", "a file", "choose another name"});
+  claim_output(folder, role);
+}
+
 void check_input(const std::filesystem::path& file, const std::string& expected) {
   std::error_code ignored;
   const auto status = std::filesystem::status(file, ignored);

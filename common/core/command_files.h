@@ -20,6 +20,9 @@ class CommandFiles {
 /// has read the file, or claims it for another output. Call it before any work.
 void claim_output(const std::filesystem::path& file, const std::string& role);
 
+/// The same of a folder that the command fills. Throws InputError also where it is a file.
+void claim_folder(const std::filesystem::path& folder, const std::string& role);
+
 /// Announces that `file` is about to be read; `expected` is for messages ("a JSON file"). Throws InputError where there
 /// is no such file, where it is a folder, a pipe or a device, and where the command claims it as an output.
 void check_input(const std::filesystem::path& file, const std::string& expected);

@@ -108,11 +108,16 @@ std::string lower_extension(const std::filesystem::path& file) {
   return extension;
 }
 
+std::string way_from(const std::filesystem::path& file) {
+  const auto way =
+      std::ranges::find(kWays, lower_extension(file), &std::pair<std::string_view, std::string_view>::first);
+  return way == kWays.end() ? "" : std::string(way->second);
+}
+
 void refuse_extension(const std::filesystem::path& file, const std::string& expected) {
   const std::string extension = lower_extension(file);
-  const auto way = std::ranges::find(kWays, extension, &std::pair<std::string_view, std::string_view>::first);
-  throw InputError({file.string(), "", expected, extension.empty() ? "no extension" : "'" + extension + "'",
-                    way == kWays.end() ? "" : std::string(way->second)});
+  throw InputError(
+      {file.string(), "", expected, extension.empty() ? "no extension" : "'" + extension + "'", way_from(file)});
 }
 
 }  // namespace exmat

@@ -125,11 +125,17 @@ void claim_writable(const std::string& file, const char* role) {
 
 /// Refuses now what would fail, or destroy an input, after the work.
 void claim_outputs(const BundleOptions& options) {
-  check_input(options.asset, "an asset file or a surface");
-  if (!options.scene.empty()) check_input(options.scene, "a scene file");
   claim_writable(options.bundle, "-o");
   claim_writable(options.depfile, "--depfile");
   claim_writable(options.write_asset, "--write-asset");
+  claim_writable(options.report, "--report");
+  if (!options.cache.empty()) claim_folder(options.cache, "--cache");
+  if (!options.alignment_report.empty()) claim_folder(options.alignment_report, "--alignment-report");
+}
+
+void check_inputs(const BundleOptions& options) {
+  check_input(options.asset, "an asset file or a surface");
+  if (!options.scene.empty()) check_input(options.scene, "a scene file");
   if (!options.depfile.empty()) precompute::depfile_text(options.bundle, {options.asset, options.scene});
 }
 
@@ -146,7 +152,7 @@ void claim_outputs(const BundleOptions& options, const AssetConfig& asset, const
 
 /// Sets `model` where it makes one.
 void make_bundle(const BundleOptions& options, RunReport& report, std::optional<ReducedModel>& model) {
-  claim_outputs(options);
+  check_inputs(options);
   const AssetConfig asset = asset_from(options.asset, options.write_asset);
   std::optional<SceneConfig> scene;
   if (!options.scene.empty()) scene = load_scene(options.scene);
@@ -230,8 +236,8 @@ void save_failure(const BundleOptions& options, RunReport& report, const std::ex
 void bundle_command(const BundleOptions& options) {
   RunReport report{.asset = options.asset, .bundle = options.bundle};
   std::optional<ReducedModel> model;
+  claim_outputs(options);
   if (options.report.empty()) return make_bundle(options, report, model);
-  claim_writable(options.report, "--report");
   const WarningRecorder recorder(report.warnings);
   try {
     make_bundle(options, report, model);

@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <cstdio>
 #include <cstdlib>
 #include <fmt/format.h>
 #include <unistd.h>
@@ -175,6 +176,7 @@ int run(std::vector<char*> words) {
                  &study = add_study(app, study_options), &full_space = add_full_space(app, full_space_options);
   return run_program(app, static_cast<int>(words.size()), words.data(), [&] {
     apply(common);
+    check_solver_options(solvers);
     precompute::configure_solvers(solvers);
     if (precompute::rank_count() > 1) log::info(fmt::format("{} ranks", precompute::rank_count()));
     if (bundle.parsed()) bundle_command(bundle_options);
@@ -199,5 +201,8 @@ void wait_passively(char** argv) {
 
 int main(int argc, char** argv) {
   wait_passively(argv);
-  return precompute::run_on_ranks([&] { return run({argv, argv + argc}); });
+  const int status = precompute::run_on_ranks([&] { return run({argv, argv + argc}); });
+  if (status == static_cast<int>(ExitStatus::kDone) || precompute::rank_count() > 1) return status;
+  std::fflush(nullptr);
+  std::_Exit(status);  // at exit libraries wait for threads that they could not make, where memory ran out
 }

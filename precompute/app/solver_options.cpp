@@ -4,6 +4,8 @@
 #include <cctype>
 #include <map>
 
+#include "common/core/error.h"
+
 namespace exmat {
 namespace {
 
@@ -13,6 +15,11 @@ bool is_solver_option(const std::string& word) { return word.starts_with("--eps-
 
 bool is_value(const std::string& word) {
   return !word.starts_with("-") || (word.size() > 1 && std::isdigit(static_cast<unsigned char>(word[1])) != 0);
+}
+
+std::string with_dashes(std::string name) {
+  std::replace(name.begin(), name.end(), '_', '-');
+  return name;
 }
 
 }  // namespace
@@ -37,6 +44,14 @@ std::vector<std::pair<std::string, std::string>> take_solver_options(std::vector
   }
   words = rest;
   return options;
+}
+
+void check_solver_options(const precompute::SolverSettings& settings) {
+  for (const auto& [name, value] : settings.options)
+    for (const char* writes : {"view", "monitor"})
+      if (name.find(writes) != std::string::npos)
+        throw InputError({"--" + with_dashes(name), "", "an option that writes no file",
+                          std::string("one with \"") + writes + "\" in its name", "leave it out"});
 }
 
 void add_solver_options(CLI::App& app, precompute::SolverSettings& settings) {

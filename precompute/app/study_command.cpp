@@ -65,6 +65,7 @@ void world_study_command(const StudyCommandOptions& options, const precompute::S
 }  // namespace
 
 void study_command(const StudyCommandOptions& options) {
+  claim_folder(options.folder, "-o");
   for (const char* name : {"report.html", "results.csv", "results.json", "sources.md", "sources.csv", "sources.svg",
                            "recommended_asset.json", "recommended_scene.json"})
     claim_output(std::filesystem::path(options.folder) / name, "-o");
@@ -88,6 +89,7 @@ void study_command(const StudyCommandOptions& options) {
 }
 
 void stability_command(const StudyCommandOptions& options) {
+  claim_folder(options.folder, "-o");
   precompute::claim_scene_study(options.folder);
   const precompute::SceneStudy study = precompute::study_scene(options.scene, options.jobs);
   precompute::write_scene_study(study, options.folder);

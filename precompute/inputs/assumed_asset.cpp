@@ -45,6 +45,13 @@ std::string cut(const std::string& text, std::size_t bytes) {
   return text.substr(0, bytes);
 }
 
+// True if all vertices go the same way, but for what a file's digits leave: no pose of a free body.
+bool is_shift(const VertexArray& rest, const VertexArray& posed) {
+  const VertexArray moves = posed - rest;
+  const double differ = (moves.colwise().maxCoeff() - moves.colwise().minCoeff()).maxCoeff();
+  return differ <= 1e-5 * bounding_box_diagonal(rest);
+}
+
 }  // namespace
 
 std::vector<std::string> example_names(const std::vector<std::string>& morphs) {
@@ -92,7 +99,12 @@ Json assumed_asset(const std::filesystem::path& surface, const std::filesystem::
     if (file.parts.contains(clamp)) asset["object"]["fixed"] = {{"part", clamp}};
   Json examples = Json::array();
   std::vector<std::string> morphs;
-  for (const MorphTarget& morph : file.morphs) morphs.push_back(morph.name);
+  for (const MorphTarget& morph : file.morphs) {
+    if (asset["object"].contains("fixed") || !is_shift(file.mesh.vertices, morph.positions))
+      morphs.push_back(morph.name);
+    else
+      log::info(fmt::format("the morph target \"{}\" moves the body as a whole and is left out", morph.name));
+  }
   if (morphs.size() > kMostExamples) {
     log::info(fmt::format("{}: of {} morph targets the first {} are examples; an asset file may name others",
                           surface.string(), morphs.size(), kMostExamples));

@@ -62,7 +62,8 @@ tinygltf::Model load(const std::string& file, const std::string& json, std::stri
   }
   if (!loaded)
     throw InputError({file, "", "a glTF file whose buffers are in it, in its folder or below that",
-                      quote(trimmed(error)), "export as .glb, which holds all buffers"});
+                      quote(trimmed(error)),
+                      buffer.empty() ? "export as .glb, which holds all buffers" : "export it again"});
   return model;
 }
 

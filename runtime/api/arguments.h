@@ -28,12 +28,8 @@ inline exmat_status wrong_length(const char* function, const char* argument, std
 #define EXMAT_REQUIRE_LENGTH(length, expected) \
   if ((length) != static_cast<std::int64_t>(expected)) return wrong_length(__func__, #length, length, expected)
 
-inline bool all_finite(const double* numbers, std::int64_t count) {
-  return std::all_of(numbers, numbers + count, [](double number) { return std::isfinite(number); });
-}
-
-/// Largest number in places [m] and velocities [m/s] that a caller gives: squares are finite, and places fit into
-/// single precision.
+/// Largest number in places [m], velocities [m/s], forces [N] and coordinates that a caller gives: squares are finite,
+/// and places fit into single precision.
 inline constexpr double kFarthest = 1e30;
 
 /// The first of `count` numbers that is not finite or farther than that; null: none.

@@ -114,8 +114,10 @@ exmat_status exmat_body_set_reduced(exmat_body* body, const double* q, const dou
   EXMAT_REQUIRE(q);
   EXMAT_REQUIRE(v);
   EXMAT_REQUIRE_LENGTH(modes, body->modes());
-  if (!all_finite(q, modes) || !all_finite(v, modes))
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: q, v: expected finite numbers", __func__);
+  for (const double* const numbers : {q, v})
+    if (const double* const far = find_far(numbers, modes))
+      return fail(EXMAT_INVALID_ARGUMENT, "%s: q, v: %g: expected finite numbers of at most %g", __func__, *far,
+                  kFarthest);
   if (body->model().skeleton)
     return fail(EXMAT_INVALID_ARGUMENT, "%s: expected a body without a skeleton, which steps in all its vertices",
                 __func__);
@@ -158,9 +160,9 @@ exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* point
     torque += (position(points->set, i / 3, *body, placement) - placement.position).cross(force);
     sum += rows.middleRows<3>(i).transpose().lazyProduct(placement.rotation.transpose() * force);
   }
-  // A force that is not finite makes every sum so, unless it is where nothing moves.
-  if (!all_finite(forces, coordinates) || !sum.allFinite())
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: forces: expected finite numbers", __func__);
+  if (const double* const far = find_far(forces, coordinates))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: forces: %g: expected finite numbers of at most %g", __func__, *far,
+                kFarthest);
   body->state.applied_force += sum;
   if (body->full() != nullptr) add_vertex_forces(points->set, forces, body->full()->space, body->state.vertex_force);
   frame.apply(total, torque, body->state.frame);

@@ -52,7 +52,9 @@ std::size_t exmat_body::example_force(std::int64_t region) const {
 exmat_status exmat_body_set_gravity(exmat_body* body, const double* gravity) noexcept {
   EXMAT_REQUIRE(body);
   EXMAT_REQUIRE(gravity);
-  if (!all_finite(gravity, 3)) return fail(EXMAT_INVALID_ARGUMENT, "%s: gravity: expected finite numbers", __func__);
+  if (const double* const far = find_far(gravity, 3))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: gravity: %g: expected finite numbers of at most %g", __func__, *far,
+                kFarthest);
   body->scene.gravity = Eigen::Map<const Eigen::Vector3d>(gravity);
   body->scene.gravity_force.noalias() = body->model().gravity_load.transpose() * body->scene.gravity;
   return EXMAT_OK;

@@ -109,7 +109,8 @@ std::size_t state_size(const exmat_body& body) {
 
 /// Throws where numbers are not those of a state of this body.
 void check(std::span<const double> numbers, exmat_body& body) {
-  if (!all_finite(numbers.data(), std::ssize(numbers))) throw InvalidArgument("numbers: expected finite ones");
+  if (const double* const far = find_far(numbers.data(), std::ssize(numbers)))
+    throw InvalidArgument(fmt::format("numbers: {}: expected finite ones of at most {}", *far, kFarthest));
   StateReader reader(numbers, StateReader::Use::kCheck);
   visit(reader, body);
   if (reader.left() > 0)

@@ -27,7 +27,7 @@ exmat_status fail_non_finite(const char* function, const char* which, const exma
   return fail(EXMAT_NON_FINITE,
               "%s: %s, step %" PRId64
               " (t = %g s): NaN or infinity; the body is as it was before. Try a smaller "
-              "time_step (now %g s), smaller loads or example stiffness, or EXMAT_BACKWARD_EULER",
+              "time_step (now %g s), smaller loads or example stiffness, or backward Euler",
               function, which, body.state.step + 1, body.state.time + body.scene.time_step, body.scene.time_step);
 }
 

@@ -81,8 +81,9 @@ exmat_status exmat_capacity_read_lost(const exmat_capacity* capacity, const exma
   if (points->source != body->source)
     return fail(EXMAT_INVALID_ARGUMENT, "%s: the points are those of another model", __func__);
   EXMAT_REQUIRE_LENGTH(coordinates, points->set.rest.size());
-  if (!all_finite(forces, coordinates))
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: forces: expected finite numbers", __func__);
+  if (const double* const far = find_far(forces, coordinates))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: forces: %g: expected finite numbers of at most %g", __func__, *far,
+                kFarthest);
   return guarded(__func__, [&] {
     const Placement placement = body->model().frame->placement(body->state.frame);
     const VertexArray own = Eigen::Map<const VertexArray>(forces, coordinates / 3, 3) * placement.rotation;

@@ -101,8 +101,8 @@ exmat_status exmat_points_create_on_surface(const exmat_surface* surface, const 
   if (count < 1) return fail(EXMAT_INVALID_ARGUMENT, "%s: count = %" PRId64 ": expected at least 1", __func__, count);
   constexpr double kSumTolerance = 1e-6;
   const Eigen::Map<const RowMatrix> given(shares, count, 3);
-  if (!all_finite(shares, 3 * count) || !((given.rowwise().sum().array() - 1).abs() <= kSumTolerance).all())
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: shares: expected finite numbers, three of each point with sum 1",
+  if (!(given.array() >= -kSumTolerance).all() || !((given.rowwise().sum().array() - 1).abs() <= kSumTolerance).all())
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: shares: expected numbers from 0 on, three of each point with sum 1",
                 __func__);
   return guarded(__func__, [&] {
     *points = new exmat_points{surface->points.source, points_on_surface(*surface, triangles, given)};

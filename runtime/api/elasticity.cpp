@@ -16,7 +16,8 @@ exmat_status exmat_model_read_elasticity(const exmat_model* model, const double*
   EXMAT_REQUIRE(q);
   const InternalForce& elasticity = model->model().internal_force;
   EXMAT_REQUIRE_LENGTH(modes, elasticity.modes());
-  if (!all_finite(q, modes)) return fail(EXMAT_INVALID_ARGUMENT, "%s: q: expected finite numbers", __func__);
+  if (const double* const far = find_far(q, modes))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: q: %g: expected finite numbers of at most %g", __func__, *far, kFarthest);
   return guarded(__func__, [&] {
     InternalForce::Workspace workspace = elasticity.make_workspace();
     const Eigen::VectorXd at = Eigen::Map<const Eigen::VectorXd>(q, modes);

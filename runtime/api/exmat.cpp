@@ -138,10 +138,9 @@ exmat_status exmat_points_create_at(const exmat_model* model, const double* xyz,
   if (coordinates < 3 || coordinates % 3 != 0)
     return fail(EXMAT_INVALID_ARGUMENT, "%s: coordinates = %" PRId64 ": expected 3 for each point", __func__,
                 coordinates);
-  if (!all_finite(xyz, coordinates)) return fail(EXMAT_INVALID_ARGUMENT, "%s: xyz: expected finite numbers", __func__);
   if (const double* const far = find_far(xyz, coordinates))
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: xyz[%td] = %g: expected at most %g m", __func__, far - xyz, *far,
-                kFarthest);
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: xyz[%td] = %g: expected finite numbers of at most %g m", __func__,
+                far - xyz, *far, kFarthest);
   return guarded(__func__, [&] {
     const std::lock_guard lock(reading());
     *points =

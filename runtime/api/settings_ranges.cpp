@@ -13,6 +13,7 @@ using Json = nlohmann::json;
 void check_ranges(const exmat_settings& settings) {
   Json scene{{"bundle", "a bundle"},
              {"time_step", settings.time_step},
+             {"gravity", settings.gravity},
              {"damping", {{"mass", settings.mass_damping}, {"stiffness", settings.stiffness_damping}}},
              {"newton", {{"max_iterations", settings.newton_iterations}, {"tolerance", settings.newton_tolerance}}},
              {"space_release", settings.space_release},

@@ -406,7 +406,8 @@ void check(std::span<const double> numbers, const Visit& visit) {
 }
 
 void set_world(std::span<const double> numbers, exmat_world& world) {
-  if (!all_finite(numbers.data(), std::ssize(numbers))) throw InvalidArgument("numbers: expected finite ones");
+  if (const double* const far = find_far(numbers.data(), std::ssize(numbers)))
+    throw InvalidArgument(fmt::format("numbers: {}: expected finite ones of at most {}", *far, kFarthest));
   check(numbers, [&](StateReader& reader) { visit_motion(reader, world); });
   const double time = time_of(world);
   StateReader reader(numbers, StateReader::Use::kTake);

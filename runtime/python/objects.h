@@ -85,6 +85,12 @@ struct ShapeObject {
   py::tuple arguments;          ///< that it was made of
 };
 
+/// An obstacle as it was when it was read.
+struct ObstacleObject {
+  exmat_obstacle description;
+  exmat_motion motion;
+};
+
 /// One of a world's obstacles that its host added, moved or gave a law.
 struct HostedObstacle {
   std::shared_ptr<ShapeObject> shape;  ///< null: the scene's
@@ -316,18 +322,20 @@ py::array positions_of(BodyObject& body, const Of& points, std::size_t k, const 
 
 namespace pybind11::detail {
 
-/// Refuses an object of __new__() alone, which holds nothing yet.
-template <typename Object>
-struct MadeCaster : type_caster_base<Object> {
+/// Refuses an object of __new__() alone, which holds nothing yet, before `Caster` makes one of unset memory.
+template <typename Object, typename Caster>
+struct CheckedCaster : Caster {
   bool load(handle source, bool convert) {
-    if (!type_caster_base<Object>::load(source, convert)) return false;
-    if (source.is_none()) return true;
     const auto* made = reinterpret_cast<const instance*>(source.ptr());
-    if (made->simple_layout && !made->simple_holder_constructed)
+    if (!source.is_none() && isinstance<Object>(source) && made->simple_layout && !made->simple_holder_constructed)
       throw type_error("expected an object that its class has made, found one of __new__() alone");
-    return true;
+    return Caster::load(source, convert);
   }
 };
+template <typename Object>
+using MadeCaster = CheckedCaster<Object, type_caster_base<Object>>;
+template <typename Object>
+using SharedCaster = CheckedCaster<Object, copyable_holder_caster<Object, std::shared_ptr<Object>>>;
 
 /// Says what it expects where pybind11 lists types of C++.
 template <std::size_t kCount>
@@ -353,7 +361,22 @@ template <> struct type_caster<exmat::python::StateObject> : MadeCaster<exmat::p
 template <> struct type_caster<exmat::python::WorldStateObject> : MadeCaster<exmat::python::WorldStateObject> {};
 template <> struct type_caster<exmat::python::SurfaceObject> : MadeCaster<exmat::python::SurfaceObject> {};
 template <> struct type_caster<exmat::python::CapacityObject> : MadeCaster<exmat::python::CapacityObject> {};
+template <> struct type_caster<exmat::python::ObstacleObject> : MadeCaster<exmat::python::ObstacleObject> {};
 template <> struct type_caster<exmat_motion> : MadeCaster<exmat_motion> {};
+template <> struct type_caster<exmat_report> : MadeCaster<exmat_report> {};
+template <> struct type_caster<exmat_energies> : MadeCaster<exmat_energies> {};
+template <> struct type_caster<exmat_world_report> : MadeCaster<exmat_world_report> {};
+template <> struct type_caster<exmat_contact_law> : MadeCaster<exmat_contact_law> {};
+template <> struct type_caster<std::shared_ptr<exmat::python::ModelObject>> : SharedCaster<exmat::python::ModelObject> {};
+template <> struct type_caster<std::shared_ptr<exmat::python::PointsObject>> : SharedCaster<exmat::python::PointsObject> {};
+template <> struct type_caster<std::shared_ptr<exmat::python::BodyObject>> : SharedCaster<exmat::python::BodyObject> {};
+template <> struct type_caster<std::shared_ptr<exmat::python::WorldObject>> : SharedCaster<exmat::python::WorldObject> {};
+template <> struct type_caster<std::shared_ptr<exmat::python::BatchObject>> : SharedCaster<exmat::python::BatchObject> {};
+template <> struct type_caster<std::shared_ptr<exmat::python::ShapeObject>> : SharedCaster<exmat::python::ShapeObject> {};
+template <> struct type_caster<std::shared_ptr<exmat::python::StateObject>> : SharedCaster<exmat::python::StateObject> {};
+template <> struct type_caster<std::shared_ptr<exmat::python::WorldStateObject>> : SharedCaster<exmat::python::WorldStateObject> {};
+template <> struct type_caster<std::shared_ptr<exmat::python::SurfaceObject>> : SharedCaster<exmat::python::SurfaceObject> {};
+template <> struct type_caster<std::shared_ptr<exmat::python::CapacityObject>> : SharedCaster<exmat::python::CapacityObject> {};
 // clang-format on
 
 }  // namespace pybind11::detail

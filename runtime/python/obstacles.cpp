@@ -119,12 +119,6 @@ void bind_shape(py::module_& module) {
 
 // ---- obstacles
 
-/// One as it was when it was read.
-struct ObstacleObject {
-  exmat_obstacle description;
-  exmat_motion motion;
-};
-
 void bind_obstacle(py::module_& module) {
   py::class_<ObstacleObject>(module, "Obstacle", "An obstacle of a body as it was when it was read. Arrays are copies.")
       .def_property_readonly(

@@ -138,13 +138,43 @@ class Commands(unittest.TestCase):
 
     def test_no_two_outputs_are_one_file(self):
         self.refused("bundle", "asset.json", "-o", "new.h5", "--depfile", "./new.h5", said=["--depfile", "-o"])
-        self.assertIn("that of --report", self.command("bundle", "asset.json", "-o", "new", "--report", "new", status=2))
+        self.refused("bundle", "asset.json", "-o", "new", "--report", "new", said=["--report", "that of -o"])
+        self.refused("bundle", "asset.json", "-o", "new.h5", "--report", "x.d", "--depfile", "./x.d", said=["--report", "that of --depfile"])
+        self.refused("bundle", "asset.json", "-o", "new.h5", "--cache", "new.h5", said=["--cache", "that of -o"])
         self.refused("run", "scene.json", "-o", "t.h5", "--dump-state", "t.xdmf", said=["--dump-state", ".xdmf"])
         self.refused("run", "scene.json", "-o", "t.h5", "--dump-state", "t.h5", said=["--dump-state"])
         self.refused("run", "scene.json", "-o", "t.xdmf", said=[".xdmf", ".h5"])
         self.refused("full-space", "scene.json", "-o", "t.xdmf", said=[".xdmf", ".h5"])
         (self.folder / "to").symlink_to("t.h5")
         self.refused("run", "scene.json", "-o", "t.h5", "--dump-state", "to", said=["--dump-state"])
+
+    def test_folders_are_no_files(self):
+        for words in (["bundle", "asset.json", "-o", "new.h5", "--cache", "bar.veg"], ["bundle", "asset.json", "-o", "new.h5", "--alignment-report", "bar.veg"],
+                      ["study", "study.json", "-o", "bar.veg"], ["study", "--stability", "scene.json", "-o", "scene.json"]):
+            self.refused(*words, said=[words[-2], "expected a folder"])
+
+    def test_options_of_the_solvers_write_no_files(self):
+        for option in ("--eps-view", "--eps-monitor", "--st-ksp-view", "--eps-view-values"):
+            self.refused("bundle", "asset.json", "-o", "new.h5", option, "ascii:bar.veg", said=["writes no file", option[2:]])
+
+    def test_a_name_may_be_as_long_as_the_system_takes(self):
+        name = 250 * "x" + ".h5"
+        self.command("run", "scene.json", "-o", name)
+        self.assertTrue((self.folder / name).exists())
+
+    def test_what_is_no_mesh_is_called_by_its_name(self):
+        for ending in (".dae", ".abc", ".off", ".vtu", ".inp", ".step"):
+            (self.folder / f"x{ending}").write_text("<?xml ?>")
+            self.assertIn(f"found '{ending}'", self.command("bundle", f"x{ending}", "-o", "new.h5", status=2))
+
+    def test_memory_that_runs_out_is_said(self):
+        """Threads of a library that could not be made were waited for at the end."""
+        for most in (150, 200, 250, 300):
+            def limit():
+                resource.setrlimit(resource.RLIMIT_AS, (most << 20, most << 20))
+            done = subprocess.run([PRECOMPUTE, "bundle", "asset.json", "-o", "new.h5"], cwd=self.folder, text=True, timeout=60, capture_output=True,
+                                  preexec_fn=limit)
+            self.assertNotEqual(done.returncode, 0)
 
     def test_an_unchanged_bundle_is_its_own_output(self):
         self.assertIn("nothing to do", self.command("bundle", "asset.json", "-o", "bar.h5", "--if-changed"))
@@ -185,7 +215,7 @@ class Commands(unittest.TestCase):
 
     def test_signals_leave_no_temporary_file(self):
         write_json(self.folder / "long.json", {"bundle": "bar.h5", "steps": 10 ** 9, "output": {"every": 10 ** 6}})
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1, signal.SIGALRM):
             process = subprocess.Popen([RUNTIME, "run", "long.json", "-o", "t.h5"], cwd=self.folder, stdout=subprocess.DEVNULL,
                                        stderr=subprocess.PIPE, text=True)
             for _ in range(500):

@@ -168,9 +168,10 @@ class Surfaces(unittest.TestCase):
         """The rest shape as a target, names that no bundle can hold, vertices of no triangle."""
         posed = bent(self.points, 90)
         write_glb(self.folder / "tube.glb", self.points, self.triangles,
-                  {"rest": self.points, "left/smile": posed, "h0": posed, "left_smile": posed, 40 * "\u00e9": posed})
+                  {"rest": self.points, "moved": self.points + (0.2, 0, 0.1), "left/smile": posed, "h0": posed, "left_smile": posed, 40 * "\u00e9": posed})
         printed = self.run_program("check", "tube.glb")
         self.assertIn('the morph target "rest" moves no vertex and is left out', printed)
+        self.assertIn('the morph target "moved" moves the body as a whole and is left out', printed)
         self.assertIn('the morph target "left/smile" is the example "left_smile 2"', printed)
         for name in ("left_smile 2", "h0_", "left_smile", 32 * "\u00e9"):
             self.assertRegex(printed, rf"{name} *same_connectivity")

@@ -87,7 +87,7 @@ void ContactWorkspace::refresh_friction(FrictionChange& change) noexcept {
   }
 }
 
-ContactSet::ContactSet(const ContactData& data, const Eigen::Vector3d& origin) {
+ContactSet::ContactSet(const ContactData& data, const Eigen::Vector3d& origin, double mass) {
   const auto count = static_cast<int>(data.areas.size());
   const VertexArray rest = data.positions.rowwise() - origin.transpose();
   tree_ = DeformationTree(IndexVector::LinSpaced(count, 0, count - 1), rest, data.basis, kLeafVertices);
@@ -97,6 +97,7 @@ ContactSet::ContactSet(const ContactData& data, const Eigen::Vector3d& origin) {
     object_vertices_.push_back(numbered ? static_cast<int>(data.vertices[index]) : index);
   rest_ = rest(data_indices_, Eigen::all);
   areas_ = data.areas(data_indices_);
+  if (count > 0) load_ = mass / areas_.sum();
   rows_ = VertexRows(data.basis, data_indices_);
   if (count > 0) reach_ = rest.rowwise().norm().maxCoeff();
 }
@@ -282,8 +283,8 @@ void ContactSet::freeze_batch(const BodyPose& pose, const BodyVelocity& velocity
     const Eigen::Vector3d at = velocity.at(arm) + pose.rotation * batch.products.col(index);
     const Eigen::Vector3d predicted = point + time_step * at;
     const Eigen::Vector3d heading = predicted + time_step * (at + expected.at(arm) - velocity.at(arm));
-    freeze_contact(placed, find_held(state, next, candidate), {point, predicted, heading}, areas_[candidate.vertex],
-                   time_step, candidate);
+    freeze_contact(placed, find_held(state, next, candidate), {point, predicted, heading, pose.position, load_},
+                   areas_[candidate.vertex], time_step, candidate);
     if (workspace.are_all_planes)
       workspace.planes.set(number, rest(candidate.vertex), placed.plane->distance(candidate.carried),
                            placed.obstacle->friction, candidate);

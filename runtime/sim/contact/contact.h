@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "common/model/reduced_model.h"
@@ -102,8 +103,9 @@ struct ContactWorkspace : ContactSums {
 class ContactSet {
  public:
   ContactSet() = default;
-  /// `origin` [m], world: what rest positions are about, BodyFrame::origin().
-  explicit ContactSet(const ContactData& data, const Eigen::Vector3d& origin = Eigen::Vector3d::Zero());
+  /// `origin` [m], world: what rest positions are about, BodyFrame::origin(). `mass` [kg], infinite: not known.
+  explicit ContactSet(const ContactData& data, const Eigen::Vector3d& origin = Eigen::Vector3d::Zero(),
+                      double mass = std::numeric_limits<double>::infinity());
 
   Eigen::Index vertices() const noexcept { return areas_.size(); }
   Eigen::Index modes() const noexcept { return rows_.modes(); }
@@ -169,9 +171,10 @@ class ContactSet {
   /// World [m/s]; `arm` is that of the vertex.
   Eigen::Vector3d world_velocity(int vertex, const Eigen::Vector3d& arm, const BodyPose& pose,
                                  const BodyVelocity& velocity) const noexcept;
-  Eigen::Vector3d rest(int vertex) const noexcept { return rest_.row(vertex); }     ///< frame of the body [m]
-  const VertexArray& rest() const noexcept { return rest_; }                        ///< all vertices
-  double area(int vertex) const noexcept { return areas_[vertex]; }                 ///< share of the surface [m^2]
+  Eigen::Vector3d rest(int vertex) const noexcept { return rest_.row(vertex); }  ///< frame of the body [m]
+  const VertexArray& rest() const noexcept { return rest_; }                     ///< all vertices
+  double area(int vertex) const noexcept { return areas_[vertex]; }              ///< share of the surface [m^2]
+  double load() const noexcept { return load_; }  ///< mass over area [kg/m^2]; infinite: not known
   VertexRows::Rows basis_rows(int vertex) const noexcept { return rows_[vertex]; }  ///< 3 x r
 
   const DeformationTree& tree() const noexcept { return tree_; }  ///< its items are the vertices, in their order
@@ -200,9 +203,10 @@ class ContactSet {
   void add_stiffness_of(int rigid, const BodyPose& pose, ContactWorkspace& workspace,
                         Eigen::MatrixXd& stiffness) const noexcept;
 
-  VertexArray rest_;       // k x 3, X
-  VertexRows rows_;        // of the basis
-  Eigen::VectorXd areas_;  // k
+  VertexArray rest_;                                       // k x 3, X
+  VertexRows rows_;                                        // of the basis
+  Eigen::VectorXd areas_;                                  // k
+  double load_ = std::numeric_limits<double>::infinity();  // [kg/m^2]
   std::vector<int> data_indices_, object_vertices_;
   DeformationTree tree_;
   double reach_ = 0;  // largest |X|

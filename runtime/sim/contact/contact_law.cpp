@@ -6,6 +6,19 @@
 namespace exmat::runtime {
 namespace {
 
+/// True if nobody has seen a vertex so deep come in, whose velocity takes it so far in a step.
+bool was_put(double depth, double gone) { return depth > kEntrySteps * gone; }
+
+/// Depth by which springs may be pressed by what is released [m]: springs of a body that is held, or pushed to several
+/// sides, hold a quarter of the energy of its motion at the speed of release, and its weight on a quarter of its
+/// surface.
+double most_pressed(const Obstacle& obstacle, const VertexMotion& motion, double time_step) {
+  if (!std::isfinite(motion.load)) return motion.load;
+  const double gravity = (motion.heading - 2 * motion.predicted + motion.point).norm() / (time_step * time_step);
+  return 0.5 * obstacle.release * std::sqrt(motion.load / obstacle.stiffness) +
+         4 * motion.load * gravity / obstacle.stiffness;
+}
+
 // Divisions and roots take most of the time of a vertex: each is done once.
 
 /// Friction of size `limit` as a function of the slip l: f1(l) / l, its derivative f1' and its integral f0, all times
@@ -102,17 +115,26 @@ void freeze_contact(const PlacedObstacle& placed, const HeldContact* held, const
   const VertexWay way{placed.carried(motion.point), motion.predicted, motion.heading};
   candidate.hint = NearestHint();
   SurfacePoint surface = placed.nearest_surface_point(way.carried, candidate.hint);
-  const Eigen::Vector3d way_out =
-      held != nullptr ? Eigen::Vector3d(placed.pose.rotation * held->way_out) : Eigen::Vector3d::Zero();
+  const double gone = (motion.predicted - way.carried).norm();
+  Eigen::Vector3d way_out = Eigen::Vector3d::Zero();
+  if (held != nullptr)
+    way_out = placed.pose.rotation * held->way_out;
+  else if (was_put(-surface.distance, gone))
+    way_out = way_out_with(placed.carried(motion.centre), placed, way.carried, surface);
   candidate.passage = find_passage(placed, way, surface, way_out);
-  if (candidate.passage.kind == Passage::Kind::kThrough) surface = candidate.passage.side.nearest(way.carried);
+  const bool is_let_out = held != nullptr ? held->overlap > 0 : !way_out.isZero(0);
+  if (candidate.passage.kind == Passage::Kind::kThrough) {
+    if (is_let_out && !way_out.isZero(0)) candidate.passage.side.normal = way_out.normalized();  // of all its body
+    surface = candidate.passage.side.nearest(way.carried);
+  }
   freeze_contact({obstacle.stiffness, obstacle.damping, obstacle.friction, obstacle.release}, surface, way.carried,
                  motion.predicted, area, time_step, candidate);
-  // A vertex that nobody has seen come in was put there.
-  const double gone = (motion.predicted - way.carried).norm();
   const double depth = -surface.distance;
-  const double before = held != nullptr ? held->overlap : depth > kEntrySteps * gone ? depth : 0;
-  candidate.release_overlap(depth, before, time_step * obstacle.release);
+  const double before = held != nullptr ? held->overlap : was_put(depth, gone) ? depth : 0;
+  const double pressed = depth - surface.normal.dot(motion.predicted - way.carried) - before;
+  candidate.release_overlap(
+      depth, before,
+      std::clamp(most_pressed(obstacle, motion, time_step) - pressed, 0.0, time_step * obstacle.release));
   if (held == nullptr) return;
   candidate.anchor = placed.pose.to_world(held->anchor);
   candidate.friction_force = obstacle.friction * held->normal_force;

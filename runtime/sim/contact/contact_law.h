@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "runtime/sim/contact/near_planes.h"
@@ -113,6 +114,9 @@ struct VertexMotion {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();      ///< place where the step begins, world [m]
   Eigen::Vector3d predicted = Eigen::Vector3d::Zero();  ///< a step on
   Eigen::Vector3d heading = Eigen::Vector3d::Zero();    ///< farther than it may go: two steps on
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();     ///< of its body, where the step begins [m]
+  /// Mass of its body over the area of the surface [kg/m^2]; infinite: not known.
+  double load = std::numeric_limits<double>::infinity();
 };
 
 /// Sets what a step keeps of a candidate, whose vertex has the share `area` of the surface [m^2]; friction and anchor

@@ -12,6 +12,8 @@ constexpr double kNearest = 1.25;  // of the nearest distance: the way out is th
 constexpr double kSameSide = 0.5;  // cosine
 constexpr double kBegun = 0.5;     // of the depth: a way inward that may end on another side
 constexpr double kBeyond = 1e-3;   // of the way out, to begin outside
+constexpr double kSunk = 0.1;      // of the deepest: what is put there goes the way of its body
+constexpr int kMostDoublings = 64;
 
 /// True if a vertex that came in by `side` has left it, where its nearest point is `there`.
 bool has_passed(const SidePlane& side, const SurfacePoint& there, const Eigen::Vector3d& point) {
@@ -65,6 +67,16 @@ Passage find_passage(const PlacedObstacle& placed, const VertexWay& way, const S
   if (reach <= kFast * shortest_passage(placed.obstacle->shape) || reach < nearest.distance) return {};
   const auto entry = first_entry(placed, way.carried, way.heading);
   return entry ? passage_by(placed, *entry, way.predicted) : Passage{};
+}
+
+Eigen::Vector3d way_out_with(const Eigen::Vector3d& centre, const PlacedObstacle& placed,
+                             const Eigen::Vector3d& carried, const SurfacePoint& nearest) noexcept {
+  if (!(-nearest.distance > kSunk * deepest(placed.obstacle->shape))) return Eigen::Vector3d::Zero();
+  const SurfacePoint out = placed.nearest_surface_point(centre);
+  if (out.distance >= 0) return Eigen::Vector3d::Zero();
+  Eigen::Vector3d way = -2 * nearest.distance * out.normal;
+  for (int i = 0; i < kMostDoublings && placed.nearest_surface_point(carried + way).distance <= 0; ++i) way *= 2;
+  return way;
 }
 
 SurfacePoint felt_surface(const PlacedObstacle& placed, const Passage& passage, const Eigen::Vector3d& point,

@@ -49,6 +49,12 @@ std::optional<SidePlane> first_entry(const PlacedObstacle& placed, const Eigen::
 Passage find_passage(const PlacedObstacle& placed, const VertexWay& way, const SurfacePoint& nearest,
                      const Eigen::Vector3d& way_out) noexcept;
 
+/// The way out of a vertex that was put inside, at `carried` with its nearest surface point `nearest`, [m], world: what
+/// is deep there leaves by the side that the `centre` of its body is nearest to, so that no body is pulled apart; 0
+/// where the nearest way serves.
+Eigen::Vector3d way_out_with(const Eigen::Vector3d& centre, const PlacedObstacle& placed,
+                             const Eigen::Vector3d& carried, const SurfacePoint& nearest) noexcept;
+
 /// The surface point that pushes a vertex at `point`; `by_plane` says whether it is the side plane.
 SurfacePoint felt_surface(const PlacedObstacle& placed, const Passage& passage, const Eigen::Vector3d& point,
                           NearestHint& hint, bool& by_plane) noexcept;

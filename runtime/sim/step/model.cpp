@@ -1,6 +1,7 @@
 #include "runtime/sim/step/model.h"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 namespace exmat::runtime {
@@ -118,7 +119,9 @@ ModelResult build_model(const ReducedModel& reduced, const ModelOptions& options
     return {nullptr, missing_group("/rigid/spin_load")};
   model->frame = make_frame(reduced.rigid ? &*reduced.rigid : nullptr, options.carried, model->gravity_load);
   if (reduced.skeleton) model->skeleton = std::make_shared<const Skeleton>(*reduced.skeleton);
-  if (reduced.contact) model->contact.emplace(*reduced.contact, model->frame->origin());
+  if (reduced.contact)
+    model->contact.emplace(*reduced.contact, model->frame->origin(),
+                           reduced.rigid ? reduced.rigid->mass : std::numeric_limits<double>::infinity());
   const RestModel rest{reduced.object->materials.model, cubature};
   if (options.examples && reduced.examples) {
     if (!reduced.projection) return {nullptr, missing_group("/projection")};

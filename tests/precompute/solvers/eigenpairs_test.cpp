@@ -140,6 +140,20 @@ TEST_P(FlatTets, GiveTheLaplacianTheEigenvaluesOfLongDouble) {
 INSTANTIATE_TEST_SUITE_P(, FlatTets, testing::Values(1e-3, 1e-5, 1e-8));
 
 // Most of all eigenpairs: the sums of all values and of their squares are traces of M^-1 K.
+// Of a soft body, or in units that make it one, the search did not end.
+TEST(Eigenpairs, AreTheSameInAnyUnits) {
+  for (const bool clamped : {false, true}) {
+    ElasticSystem system = system_of(test::box_mesh({6, 2, 2}, {0.6, 0.2, 0.2}), clamped);
+    const Eigen::VectorXd expected = pairs_of(system).values;
+    for (const double share : {1e-20, 1e-11, 1e-6, 1e11}) {
+      ElasticSystem other = system;
+      other.stiffness *= share;
+      EXPECT_LE((pairs_of(other).values / share - expected).cwiseQuotient(expected).cwiseAbs().maxCoeff(), 1e-8)
+          << share << (clamped ? ", clamped" : "");
+    }
+  }
+}
+
 TEST(Eigenpairs, NearlyAllOfASmallBodyAreFound) {
   const TetMesh mesh = test::box_mesh({3, 2, 2}, {3, 2, 1});  // 36 vertices
   for (const bool clamped : {false, true}) {

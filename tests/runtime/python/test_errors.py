@@ -133,7 +133,11 @@ def test_a_hundred_thousand_creations_leave_no_memory(model, body):
     lambda m: exmat.Body.__new__(exmat.Body).q, lambda m: exmat.Body.__new__(exmat.Body).step(), lambda m: exmat.World.__new__(exmat.World).step(),
     lambda m: exmat.Batch.__new__(exmat.Batch).q, lambda m: exmat.Points.__new__(exmat.Points).distances, lambda m: exmat.Shape.__new__(exmat.Shape).kind,
     lambda m: exmat.Model.__new__(exmat.Model).modes, lambda m: exmat.Surface.__new__(exmat.Surface).rest,
-    lambda m: exmat.World().add_obstacle(exmat.Shape.sphere(1), motion=exmat.Motion.__new__(exmat.Motion))])
+    lambda m: exmat.World().add_obstacle(exmat.Shape.sphere(1), motion=exmat.Motion.__new__(exmat.Motion)),
+    lambda m: exmat.Body(exmat.Model.__new__(exmat.Model)), lambda m: exmat.World().add(exmat.Body.__new__(exmat.Body)),
+    lambda m: exmat.state_hash([exmat.Body.__new__(exmat.Body)]), lambda m: exmat.ContactLaw.__new__(exmat.ContactLaw).stiffness,
+    lambda m: exmat.Obstacle.__new__(exmat.Obstacle).half_extents, lambda m: exmat.Energies.__new__(exmat.Energies).total,
+    lambda m: exmat.Report.__new__(exmat.Report).steps, lambda m: exmat.WorldReport.__new__(exmat.WorldReport).steps])
 def test_none_and_objects_that_nobody_made_are_type_errors(model, call):
     with pytest.raises(TypeError):
         call(model)
@@ -141,7 +145,7 @@ def test_none_and_objects_that_nobody_made_are_type_errors(model, call):
 
 def test_points_beyond_all_bodies_are_refused(model):
     for far in (1e155, 1e300):
-        with pytest.raises(exmat.InvalidArgument, match=r"^xyz\[0\] = 1e\+[0-9]+: expected at most 1e\+30 m$"):  # no function of C
+        with pytest.raises(exmat.InvalidArgument, match=r"^xyz\[0\] = 1e\+[0-9]+: expected finite numbers of at most 1e\+30 m$"):  # no function of C
             exmat.Points.at(model, [[far, 0, 0]])
 
 
@@ -201,6 +205,24 @@ def test_members_that_are_none_are_refused_in_words(model, tmp_path):
         exmat.precompute.check({"name": "x", "object": {"mesh": "a.msh", "material": {1, 2}}})
     with pytest.raises(exmat.InvalidArgument, match="count: expected 1 to 1000000"):
         exmat.Batch(model, 2**62)
+
+
+def test_numbers_whose_results_would_not_be_finite_are_refused(model):
+    body = exmat.Body(model)
+    far = np.full(model.modes, 1e154)
+    corner = exmat.Points(model, [0])
+    for call in (lambda: body.set_reduced(far, 0 * far), lambda: body.set_reduced(0 * far, far), lambda: model.elasticity(far),
+                 lambda: body.apply_forces(corner, [(1e154, 0, 0)]), lambda: setattr(body, "gravity", (1e154, 0, 0))):
+        with pytest.raises(exmat.InvalidArgument, match=r"1e\+154: expected finite (numbers|ones) of at most 1e\+30"):
+            call()
+    body.set_reduced(0 * far + 1e30, 0 * far)
+    assert np.isfinite(body.positions(corner)).all() and np.isfinite(model.elasticity(0 * far + 1e30)[0])
+
+
+def test_a_path_with_a_zero_byte_is_refused(bundle):
+    for path in (str(bundle) + "\0junk", "a\0b"):
+        with pytest.raises((exmat.InvalidArgument, exmat.BadInput, ValueError), match="zero byte|null"):
+            exmat.Model(path)
 
 
 def test_motion_of_absurd_speed_is_refused(free_bundle):

@@ -8,7 +8,7 @@
 namespace exmat::runtime {
 
 FullContacts::FullContacts(const ContactSet& set, const FullSpace& space, const Eigen::Vector3d& origin)
-    : rest_(set.rest().rowwise() + origin.transpose()), areas_(set.vertices()) {
+    : rest_(set.rest().rowwise() + origin.transpose()), areas_(set.vertices()), load_(set.load()) {
   for (int v = 0; v < set.vertices(); ++v) {
     areas_[v] = set.area(v);
     places_.push_back(space.place(set.object_vertex(v)));
@@ -28,9 +28,16 @@ bool FullContacts::begin(const Obstacles& obstacles, double end_time, double tim
   contact.set_zero(contact.generalised.size());
   contact.obstacles.resize(obstacles.size());  // within what it was sized for
   double square = 0;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  int moving = 0;
   const auto moves = [this](int vertex) { return places_[static_cast<std::size_t>(vertex)] >= 0; };
-  for (int vertex = 0; vertex < std::ssize(places_); ++vertex)
-    if (moves(vertex)) square = std::max(square, at(vertex, v).squaredNorm());
+  for (int vertex = 0; vertex < std::ssize(places_); ++vertex) {
+    if (!moves(vertex)) continue;
+    square = std::max(square, at(vertex, v).squaredNorm());
+    centre += point(vertex, u);
+    ++moving;
+  }
+  centre /= std::max(1, moving);
   const double way = time_step * std::sqrt(square);
   const double margin = kContactMarginSteps * way + time_step * time_step * gravity.norm() + held.longest_way_out();
   for (std::size_t i = 0; i < obstacles.size(); ++i) {
@@ -52,8 +59,8 @@ bool FullContacts::begin(const Obstacles& obstacles, double end_time, double tim
       const Eigen::Vector3d ahead = time_step * at(vertex, v);
       const Eigen::Vector3d predicted = here + ahead;
       freeze_contact(contact.obstacles[i], find_held(held, next, candidate),
-                     {here, predicted, predicted + ahead + time_step * time_step * gravity}, areas_[vertex], time_step,
-                     candidate);
+                     {here, predicted, predicted + ahead + time_step * time_step * gravity, centre, load_},
+                     areas_[vertex], time_step, candidate);
     }
   }
   return contact.candidate_count > 0;

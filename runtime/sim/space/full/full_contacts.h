@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "runtime/sim/contact/contact.h"
@@ -69,9 +70,10 @@ class FullContacts {
     return Eigen::Map<const Eigen::Vector3d>(field + 4 * places_[static_cast<std::size_t>(vertex)]);
   }
 
-  VertexArray rest_;                  // k x 3, world [m]
-  Eigen::VectorXd areas_;             // k
-  std::vector<Eigen::Index> places_;  // of the set's vertices, in fields
+  VertexArray rest_;                                       // k x 3, world [m]
+  Eigen::VectorXd areas_;                                  // k
+  double load_ = std::numeric_limits<double>::infinity();  // [kg/m^2]
+  std::vector<Eigen::Index> places_;                       // of the set's vertices, in fields
 };
 
 }  // namespace exmat::runtime

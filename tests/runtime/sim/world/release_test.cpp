@@ -44,6 +44,29 @@ TEST(Release, ABodyThatBeginsInTheFloorIsLetOutSlowly) {
       }
 }
 
+// Nearest points would pull it apart to all sides, and it would snap out at up to 80 m/s.
+TEST(Release, ABodyThatIsPutDeepIntoACurvedObstacleIsLetOutToOneSide) {
+  const Eigen::Vector3d centre(0.2, 0.1, 0.1);
+  const std::vector<std::pair<std::string, Shape>> shapes{
+      {"beside the middle of a large sphere", Sphere{{0.12, 0.1, 0.1}, 1.2}},
+      {"in the middle of a small sphere", Sphere{centre, 0.36}},
+      {"on the axis of a capsule", Capsule{centre - Eigen::Vector3d::UnitX(), centre + Eigen::Vector3d::UnitX(), 0.8}},
+      {"across a plate", Box{centre, {0.12, 1, 1}}}};
+  for (const auto& [name, shape] : shapes)
+    for (const double youngs_modulus : {1e3, 1e5, 1e7}) {
+      SCOPED_TRACE(testing::Message() << name << ", E " << youngs_modulus);
+      exmat::test::BarOptions options = Blocks::free_block();
+      options.youngs_modulus = youngs_modulus;
+      Blocks blocks(2e-3, options);
+      blocks.scene.obstacles.push_back(Obstacle{shape, RigidMotion(), 1e8, 0, 0});
+      World world({blocks.body({0, 0, 0})}, {1e7, 0, 0});
+      // Soft ones are stretched on their way.
+      const double limit = (youngs_modulus < 1e4 ? 3 : 2) * kRelease;
+      for (int second = 0; second < 4; ++second) EXPECT_LE(fastest_of(blocks, world), limit);
+      EXPECT_GT(signed_distance(shape, blocks.centre(world.state(0))), 0) << "it is out";
+    }
+}
+
 TEST(Release, BodiesThatBeginInEachOtherPartSlowly) {
   for (const double time_step : {1e-3, 1.0 / 60})
     for (const double friction : {0.0, 0.5}) {
