@@ -117,25 +117,26 @@ void write_depfile(const BundleOptions& options, const BuildReport& report) {
   write_file_atomically(options.depfile, precompute::depfile_text(options.bundle, files));
 }
 
-void claim_writable(const std::string& file, const char* role) {
+void check_writable(const std::string& file) {
   if (file.empty()) return;
-  claim_output(file, role);
   const AtomicFile writable(file);
 }
 
-/// Refuses now what would fail, or destroy an input, after the work.
+/// Refuses outputs that are one file: no report of that is written, for it may be of that name.
 void claim_outputs(const BundleOptions& options) {
-  claim_writable(options.bundle, "-o");
-  claim_writable(options.depfile, "--depfile");
-  claim_writable(options.write_asset, "--write-asset");
-  claim_writable(options.report, "--report");
+  claim_output(options.bundle, "-o");
+  if (!options.depfile.empty()) claim_output(options.depfile, "--depfile");
+  if (!options.write_asset.empty()) claim_output(options.write_asset, "--write-asset");
+  if (!options.report.empty()) claim_output(options.report, "--report");
   if (!options.cache.empty()) claim_folder(options.cache, "--cache");
   if (!options.alignment_report.empty()) claim_folder(options.alignment_report, "--alignment-report");
 }
 
-void check_inputs(const BundleOptions& options) {
+/// Refuses now what would fail, or destroy an input, after the work.
+void check_files(const BundleOptions& options) {
   check_input(options.asset, "an asset file or a surface");
   if (!options.scene.empty()) check_input(options.scene, "a scene file");
+  for (const std::string& file : {options.bundle, options.depfile, options.write_asset}) check_writable(file);
   if (!options.depfile.empty()) precompute::depfile_text(options.bundle, {options.asset, options.scene});
 }
 
@@ -152,7 +153,7 @@ void claim_outputs(const BundleOptions& options, const AssetConfig& asset, const
 
 /// Sets `model` where it makes one.
 void make_bundle(const BundleOptions& options, RunReport& report, std::optional<ReducedModel>& model) {
-  check_inputs(options);
+  check_files(options);
   const AssetConfig asset = asset_from(options.asset, options.write_asset);
   std::optional<SceneConfig> scene;
   if (!options.scene.empty()) scene = load_scene(options.scene);
@@ -238,6 +239,7 @@ void bundle_command(const BundleOptions& options) {
   std::optional<ReducedModel> model;
   claim_outputs(options);
   if (options.report.empty()) return make_bundle(options, report, model);
+  check_writable(options.report);
   const WarningRecorder recorder(report.warnings);
   try {
     make_bundle(options, report, model);

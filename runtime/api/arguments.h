@@ -28,7 +28,7 @@ inline exmat_status wrong_length(const char* function, const char* argument, std
 #define EXMAT_REQUIRE_LENGTH(length, expected) \
   if ((length) != static_cast<std::int64_t>(expected)) return wrong_length(__func__, #length, length, expected)
 
-/// Largest number in places [m], velocities [m/s], forces [N] and coordinates that a caller gives: squares are finite,
+/// Largest number in places [m], velocities [m/s], gravity and coordinates that a caller gives: squares are finite,
 /// and places fit into single precision.
 inline constexpr double kFarthest = 1e30;
 

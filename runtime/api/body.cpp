@@ -160,9 +160,10 @@ exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* point
     torque += (position(points->set, i / 3, *body, placement) - placement.position).cross(force);
     sum += rows.middleRows<3>(i).transpose().lazyProduct(placement.rotation.transpose() * force);
   }
-  if (const double* const far = find_far(forces, coordinates))
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: forces: %g: expected finite numbers of at most %g", __func__, *far,
-                kFarthest);
+  // A force that is not finite makes every sum so, unless it is where nothing moves.
+  if (!std::all_of(forces, forces + coordinates, [](double number) { return std::isfinite(number); }) ||
+      !sum.allFinite())
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: forces: expected finite numbers", __func__);
   body->state.applied_force += sum;
   if (body->full() != nullptr) add_vertex_forces(points->set, forces, body->full()->space, body->state.vertex_force);
   frame.apply(total, torque, body->state.frame);

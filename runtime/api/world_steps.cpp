@@ -114,7 +114,8 @@ exmat_status exmat_body_step(exmat_body* body, std::int64_t steps, exmat_report*
   if (steps < 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: steps = %" PRId64 ": expected >= 0", __func__, steps);
   if (report != nullptr)
     if (const exmat_status status = check_size(__func__, report->size, kReportSizes)) return status;
-  if (!body->own) return fail(EXMAT_INVALID_ARGUMENT, "%s: the body is in a world, which steps it", __func__);
+  if (!body->own)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: the body is in a world, whose step() takes it along", __func__);
   if (!acquire(*body)) return fail(EXMAT_INVALID_ARGUMENT, "%s: another thread steps this body", __func__);
   const exmat_status stepped = guarded(__func__, [&] { advance(*body->own, steps, 1); });
   if (report != nullptr) give(body->report, report->size, report);

@@ -74,7 +74,6 @@ TEST(Stability, ThePileThatDoesNotComeToRestIsHeldByACoupleOfFriction) {
   const auto rest = [&](std::size_t i) { return runs[i].result[Check::kRest]; };
   EXPECT_EQ(runs[0].result.limit_id(Check::kRest), "friction-couple");
   EXPECT_EQ(rest(1).verdict, Verdict::kPass) << rest(1).value;
-  EXPECT_EQ(runs[2].result.limit_id(Check::kRest), "friction-couple");
   EXPECT_NEAR(rest(2).value, rest(0).value / 16, 0.2 * rest(0).value / 16);
 }
 

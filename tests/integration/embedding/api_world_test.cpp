@@ -280,7 +280,7 @@ TEST_F(ApiWorldTest, WrongArgumentsAreRefusedInWords) {
   says(exmat_world_add_body(world.get(), faster.get(), &id), "time step is 0.001 s");
   EXPECT_EQ(id, -1);
   says(exmat_world_add_body(world.get(), world.body(0).get(), &id), "in a world already");
-  says(exmat_body_step(world.body(0).get(), 1, nullptr), "exmat_world_step()");
+  says(exmat_body_step(world.body(0).get(), 1, nullptr), "in a world, whose step() takes it along");
   says(exmat_world_add_body(exmat_body_world(faster.get()), alone.get(), &id), "found a body's own");
   says(exmat_body_set_group(alone.get(), 0, 1), "group = 0");
   exmat_body* body = nullptr;

@@ -146,7 +146,8 @@ TEST_F(BadBodyState, IsRefusedAndTheBodyIsAsItWas) {
     return "taken";
   };
   EXPECT_THAT(refusal(good.size(), 0), HasSubstr("expected"));
-  EXPECT_THAT(refusal(7, std::numeric_limits<double>::infinity()), HasSubstr("numbers: expected finite ones"));
+  EXPECT_THAT(refusal(7, std::numeric_limits<double>::infinity()),
+              HasSubstr("numbers: inf: expected finite ones of at most 1e+30"));
   EXPECT_THAT(refusal(0, 1), HasSubstr("layout 1: expected 4"));
   EXPECT_THAT(refusal(1, 0.02), HasSubstr("time step 0.02 s: expected 0.01 s, the model's"));
   EXPECT_THAT(refusal(2, 0.5), HasSubstr("steps = 0.5: expected a whole number"));

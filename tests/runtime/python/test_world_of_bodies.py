@@ -261,7 +261,7 @@ def test_while_a_world_is_stepped_others_wait(world):
 
 
 def test_a_body_of_no_finite_numbers_is_named(world):
-    world[1].set_reduced(np.full(12, 1e200), np.zeros(12))
+    world[1].apply_forces(exmat.Points(world[1].model, [0]), [(1e300, 0, 0)])
     with pytest.raises(exmat.NonFinite, match="body 1"):
         world.step(5)
     assert world.report.steps == 0
