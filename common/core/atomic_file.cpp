@@ -79,7 +79,7 @@ std::filesystem::path folder_of(const std::filesystem::path& target) {
   return target.has_parent_path() ? target.parent_path() : std::filesystem::path(".");
 }
 
-// Of the name of a temporary file: the target's, as much of it as leaves room for the rest.
+// A temporary file begins with its target's name, with as much of it as leaves room for the rest.
 std::string beginning_of(const std::filesystem::path& target) {
   constexpr std::size_t kMost = 128;
   return target.filename().string().substr(0, kMost);

@@ -20,7 +20,7 @@ std::string_view kind_of_file(std::string_view bytes);
 /// The extension in lower case, with its point: ".obj" of "A.OBJ".
 std::string lower_extension(const std::filesystem::path& file);
 
-/// What makes a mesh of a file of another kind, by its extension: "export it as .glb, ..."; empty: not known.
+/// Advice that turns a file of another kind, by its extension, into a mesh: "export it as .glb, ..."; empty: not known.
 std::string way_from(const std::filesystem::path& file);
 
 /// Refuses a file whose extension is none of those expected, with the way to one of them where it is known.

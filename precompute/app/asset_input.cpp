@@ -16,10 +16,8 @@ AssetConfig asset_from(const std::filesystem::path& asset_or_surface, const std:
     if (!write_to.empty())
       throw InputError({"--write-asset", "", "a surface in place of an asset file, whose asset is to be written",
                         asset_or_surface.string(), ""});
-    if (const std::string way = way_from(asset_or_surface);
-        !way.empty() && lower_extension(asset_or_surface) != ".json")
-      throw InputError({asset_or_surface.string(), "", "an asset file (.json) or a surface",
-                        "'" + lower_extension(asset_or_surface) + "'", way});
+    if (lower_extension(asset_or_surface) != ".json" && !way_from(asset_or_surface).empty())
+      refuse_extension(asset_or_surface, "an asset file (.json) or a surface");
     return load_asset(asset_or_surface);
   }
   const Json assumed = precompute::assumed_asset(asset_or_surface, asset_or_surface.parent_path());

@@ -161,8 +161,7 @@ exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* point
     sum += rows.middleRows<3>(i).transpose().lazyProduct(placement.rotation.transpose() * force);
   }
   // A force that is not finite makes every sum so, unless it is where nothing moves.
-  if (!std::all_of(forces, forces + coordinates, [](double number) { return std::isfinite(number); }) ||
-      !sum.allFinite())
+  if (!Eigen::Map<const Eigen::VectorXd>(forces, coordinates).allFinite() || !sum.allFinite())
     return fail(EXMAT_INVALID_ARGUMENT, "%s: forces: expected finite numbers", __func__);
   body->state.applied_force += sum;
   if (body->full() != nullptr) add_vertex_forces(points->set, forces, body->full()->space, body->state.vertex_force);

@@ -167,7 +167,7 @@ class Commands(unittest.TestCase):
             (self.folder / f"x{ending}").write_text("<?xml ?>")
             self.assertIn(f"found '{ending}'", self.command("bundle", f"x{ending}", "-o", "new.h5", status=2))
 
-    def test_memory_that_runs_out_is_said(self):
+    def test_memory_that_runs_out_ends_the_command(self):
         """Threads of a library that could not be made were waited for at the end."""
         for most in (150, 200, 250, 300):
             def limit():

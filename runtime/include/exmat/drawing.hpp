@@ -15,13 +15,13 @@ namespace exmat {
 inline exmat_bundle_info bundle_info(const std::string& bundle) {
   exmat_bundle_info info;
   info.size = sizeof info;
-  check(exmat_bundle_read_info(c_text(bundle), &info));
+  check(exmat_bundle_read_info(detail::c_text(bundle), &info));
   return info;
 }
 
 inline std::string bundle_region_name(const std::string& bundle, std::size_t region) {
   char name[256];
-  check(exmat_bundle_read_region_name(c_text(bundle), static_cast<std::int64_t>(region), name, sizeof name));
+  check(exmat_bundle_read_region_name(detail::c_text(bundle), static_cast<std::int64_t>(region), name, sizeof name));
   return name;
 }
 

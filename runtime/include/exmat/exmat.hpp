@@ -34,6 +34,13 @@ inline void check(exmat_status status) {
 
 namespace detail {
 
+/// As C takes it, which would end at a zero byte. Throws Error where there is one.
+inline const char* c_text(const std::string& text) {
+  if (text.find('\0') != std::string::npos)
+    throw Error(EXMAT_INVALID_ARGUMENT, (std::string(text.c_str()) + ": expected text, found a zero byte").c_str());
+  return text.c_str();
+}
+
 template <auto Destroy>
 struct Destroyer {
   template <typename Handle>
@@ -57,13 +64,6 @@ inline exmat_settings default_settings() {
   exmat_settings settings;
   check(exmat_settings_default(&settings, sizeof settings));
   return settings;
-}
-
-/// As C takes it, which would end at a zero byte. Throws Error where there is one.
-inline const char* c_text(const std::string& text) {
-  if (text.find('\0') != std::string::npos)
-    throw Error(EXMAT_INVALID_ARGUMENT, (std::string(text.c_str()) + ": expected text, found a zero byte").c_str());
-  return text.c_str();
 }
 
 inline exmat_attachment default_attachment() {
@@ -108,7 +108,7 @@ class Model {
   explicit Model(const std::string& bundle) : Model(bundle, default_settings()) {}
   Model(const std::string& bundle, const exmat_settings& settings) {
     exmat_model* model = nullptr;
-    check(exmat_model_create(c_text(bundle), &settings, &model));
+    check(exmat_model_create(detail::c_text(bundle), &settings, &model));
     handle_.reset(model);
   }
   /// Loads a pack of a bundle; the library keeps a copy of it.
@@ -119,14 +119,14 @@ class Model {
   }
   static Model from_scene(const std::string& scene) {
     exmat_model* model = nullptr;
-    check(exmat_model_create_from_scene(c_text(scene), &model));
+    check(exmat_model_create_from_scene(detail::c_text(scene), &model));
     return Model(model);
   }
 
   /// Loads the text of a scene file; `path` names it.
   static Model from_text(const std::string& scene, const std::string& path, bool use_contact = false) {
     exmat_model* model = nullptr;
-    check(exmat_model_create_from_text(c_text(scene), c_text(path), use_contact ? 1 : 0, &model));
+    check(exmat_model_create_from_text(detail::c_text(scene), detail::c_text(path), use_contact ? 1 : 0, &model));
     return Model(model);
   }
 

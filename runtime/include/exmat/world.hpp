@@ -173,13 +173,13 @@ class World : public WorldRef {
   /// Loads a scene file.
   static World from_scene(const std::string& scene) {
     exmat_world* world = nullptr;
-    check(exmat_world_create_from_scene(c_text(scene), &world));
+    check(exmat_world_create_from_scene(detail::c_text(scene), &world));
     return World(world);
   }
   /// Loads the text of such a file, which `path` names.
   static World from_text(const std::string& scene, const std::string& path, bool use_contact = false) {
     exmat_world* world = nullptr;
-    check(exmat_world_create_from_text(c_text(scene), c_text(path), use_contact ? 1 : 0, &world));
+    check(exmat_world_create_from_text(detail::c_text(scene), detail::c_text(path), use_contact ? 1 : 0, &world));
     return World(world);
   }
 

@@ -122,19 +122,21 @@ void freeze_contact(const PlacedObstacle& placed, const HeldContact* held, const
   else if (was_put(-surface.distance, gone))
     way_out = way_out_with(placed.carried(motion.centre), placed, way.carried, surface);
   candidate.passage = find_passage(placed, way, surface, way_out);
-  const bool is_let_out = held != nullptr ? held->overlap > 0 : !way_out.isZero(0);
   if (candidate.passage.kind == Passage::Kind::kThrough) {
-    if (is_let_out && !way_out.isZero(0)) candidate.passage.side.normal = way_out.normalized();  // of all its body
+    const bool is_let_out = !way_out.isZero(0) && (held == nullptr || held->overlap > 0);
+    if (is_let_out) candidate.passage.side.normal = way_out.normalized();  // that of all its body
     surface = candidate.passage.side.nearest(way.carried);
   }
   freeze_contact({obstacle.stiffness, obstacle.damping, obstacle.friction, obstacle.release}, surface, way.carried,
                  motion.predicted, area, time_step, candidate);
   const double depth = -surface.distance;
   const double before = held != nullptr ? held->overlap : was_put(depth, gone) ? depth : 0;
-  const double pressed = depth - surface.normal.dot(motion.predicted - way.carried) - before;
-  candidate.release_overlap(
-      depth, before,
-      std::clamp(most_pressed(obstacle, motion, time_step) - pressed, 0.0, time_step * obstacle.release));
+  if (before > 0) {
+    const double pressed = depth - surface.normal.dot(motion.predicted - way.carried) - before;
+    candidate.release_overlap(
+        depth, before,
+        std::clamp(most_pressed(obstacle, motion, time_step) - pressed, 0.0, time_step * obstacle.release));
+  }
   if (held == nullptr) return;
   candidate.anchor = placed.pose.to_world(held->anchor);
   candidate.friction_force = obstacle.friction * held->normal_force;

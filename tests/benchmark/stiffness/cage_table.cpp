@@ -38,8 +38,7 @@ std::string rows_of(const std::string& name, const std::vector<CagedBody>& bodie
   for (const CagedBody& body : bodies) {
     const precompute::QuadraticTets own = quadratic_of(body.mesh, poisson_ratio, body.clamp);
     const auto cells_of = [&](const Response& response) {
-      const Eigen::Vector4d soft = response.work.cwiseQuotient(reference.work);
-      const Eigen::VectorXd fast = response.frequencies.cwiseQuotient(reference.frequencies);
+      const auto [soft, fast] = over(response, reference);
       return fmt::format("{:.2f} to {:.2f} | {:.2f} to {:.2f}", soft.head<3>().minCoeff(), soft.head<3>().maxCoeff(),
                          fast.minCoeff(), fast.maxCoeff());
     };

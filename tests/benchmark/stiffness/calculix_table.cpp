@@ -106,9 +106,7 @@ std::optional<Table> calculix_table() {
       if (shape.name == "ring") meshes.push_back({2 * cells[0], 2 * cells[1], 2 * cells[2]});
       for (const std::array<int, 3>& its : meshes) {
         const TetMesh finer = mesh_of(shape, its);
-        const Response response = calculix(finer, clamp_of(shape, its), poisson_ratio);
-        const Eigen::Vector4d soft = response.work.cwiseQuotient(reference.work);
-        const Eigen::VectorXd fast = response.frequencies.cwiseQuotient(reference.frequencies);
+        const auto [soft, fast] = over(calculix(finer, clamp_of(shape, its), poisson_ratio), reference);
         table.rows +=
             fmt::format("| {} | {} | {} | {:.3f} | {:.3f} | {:.3f} | {:.3f} to {:.3f} |\n", shape.name,
                         finer.tet_count(), poisson_ratio, soft[1], soft[2], soft[0], fast.minCoeff(), fast.maxCoeff());

@@ -9,10 +9,8 @@ namespace {
 
 constexpr std::array kPoissonRatios = {0.3, 0.45, 0.49, 0.499};
 
-// Works and frequencies over those of the reference: 1 is right.
-std::string cells_of(const Response& response, const Response& reference, double beta) {
-  const Eigen::Vector4d soft = response.work.cwiseQuotient(reference.work);
-  const Eigen::VectorXd fast = response.frequencies.cwiseQuotient(reference.frequencies);
+std::string cells_of(const Response& share, double beta) {
+  const auto& [soft, fast] = share;
   return fmt::format("{:.2f} | {:.2f} | {:.2f} | {:.2f} | {:.2f} to {:.2f}{}", soft[1], soft[2], soft[3], soft[0],
                      fast.minCoeff(), fast.maxCoeff(), beta > 0 ? fmt::format(" | {:.2f}", beta) : " |");
 }
@@ -30,9 +28,9 @@ std::string rows_of(const Shape& shape, double poisson_ratio) {
       for (const Formulation formulation : {Formulation::kLinear, Formulation::kSmoothed}) {
         const TetMaterials materials = material_of(mesh, poisson_ratio, formulation, clamp);
         const Response response = response_of(precompute::build_elastic_system(mesh, materials, clamp), mesh.vertices);
-        rows +=
-            fmt::format("| {} | {}{} | {} | {} | {} |\n", shape.name, mesh.tet_count(), unstructured ? ", moved" : "",
-                        poisson_ratio, name_of(formulation), cells_of(response, reference, materials.variance_factor));
+        rows += fmt::format("| {} | {}{} | {} | {} | {} |\n", shape.name, mesh.tet_count(),
+                            unstructured ? ", moved" : "", poisson_ratio, name_of(formulation),
+                            cells_of(over(response, reference), materials.variance_factor));
       }
     }
   return rows;

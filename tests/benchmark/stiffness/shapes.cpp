@@ -9,7 +9,7 @@
 #include "common/mesh/geometry.h"
 #include "precompute/modes/mesh_stiffness.h"
 #include "precompute/solvers/eigenpairs.h"
-#include "tests/support/box_mesh.h"
+#include "tests/support/posed_bodies.h"
 #include "tests/support/random.h"
 
 namespace exmat::benchmarks {
@@ -45,24 +45,9 @@ const std::vector<Shape>& all_shapes() {
 }
 
 TetMesh mesh_of(const Shape& shape, const std::array<int, 3>& cells, bool unstructured) {
-  const TetMesh grid = test::box_mesh(cells, shape.lengths);
-  std::vector<Eigen::Index> kept;
-  for (Eigen::Index t = 0; t < grid.tet_count(); ++t)
-    if (shape.holds(tet_positions(grid, t).colwise().mean().transpose())) kept.push_back(t);
-  TetMesh mesh;
-  mesh.tets = grid.tets(kept, Eigen::all);
-  std::vector<std::int32_t> place(static_cast<std::size_t>(grid.vertex_count()), -1);
-  std::vector<std::int32_t> used;
-  for (std::int32_t& vertex : mesh.tets.reshaped()) {
-    std::int32_t& at = place[static_cast<std::size_t>(vertex)];
-    if (at < 0) {
-      at = static_cast<std::int32_t>(used.size());
-      used.push_back(vertex);
-    }
-    vertex = at;
-  }
-  mesh.vertices = grid.vertices(used, Eigen::all);
-  const Eigen::Index count = std::ssize(used);
+  TetMesh mesh = test::without(test::box_mesh(cells, shape.lengths),
+                               [&](const Eigen::RowVector3d& x) { return !shape.holds(x.transpose()); });
+  const Eigen::Index count = mesh.vertex_count();
   if (unstructured) {
     const TriangleArray surface = surface_triangles(mesh.tets);
     std::vector<bool> outside(static_cast<std::size_t>(count), false);
@@ -88,6 +73,10 @@ Response response_of(const precompute::ElasticSystem& system, const VertexArray&
   const Eigen::MatrixXd loads = system.restrict(system.full_mass * fields);
   return {loads.cwiseProduct(solver.solve(loads)).colwise().sum().transpose(),
           precompute::smallest_eigenpairs(system.stiffness, system.mass, solver, kModes).values.cwiseSqrt()};
+}
+
+Response over(const Response& response, const Response& reference) {
+  return {response.work.cwiseQuotient(reference.work), response.frequencies.cwiseQuotient(reference.frequencies)};
 }
 
 FlagVector clamp_of(const Shape& shape, const std::array<int, 3>& cells) {

@@ -42,6 +42,9 @@ struct Response {
 };
 Response response_of(const precompute::ElasticSystem& system, const VertexArray& nodes);
 
+/// Each figure over that of the reference: 1 is right.
+Response over(const Response& response, const Response& reference);
+
 /// A table of the page, which begins there with its head.
 struct Table {
   std::string head, rows;

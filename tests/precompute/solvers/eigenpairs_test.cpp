@@ -140,7 +140,7 @@ TEST_P(FlatTets, GiveTheLaplacianTheEigenvaluesOfLongDouble) {
 INSTANTIATE_TEST_SUITE_P(, FlatTets, testing::Values(1e-3, 1e-5, 1e-8));
 
 // Most of all eigenpairs: the sums of all values and of their squares are traces of M^-1 K.
-// Of a soft body, or in units that make it one, the search did not end.
+// The search did not end for a soft body, or in units that make it one.
 TEST(Eigenpairs, AreTheSameInAnyUnits) {
   for (const bool clamped : {false, true}) {
     ElasticSystem system = system_of(test::box_mesh({6, 2, 2}, {0.6, 0.2, 0.2}), clamped);

@@ -221,7 +221,7 @@ def test_numbers_whose_results_would_not_be_finite_are_refused(model):
 
 def test_a_path_with_a_zero_byte_is_refused(bundle):
     for path in (str(bundle) + "\0junk", "a\0b"):
-        with pytest.raises((exmat.InvalidArgument, exmat.BadInput, ValueError), match="zero byte|null"):
+        with pytest.raises(exmat.InvalidArgument, match="expected text, found a zero byte$"):
             exmat.Model(path)
 
 
