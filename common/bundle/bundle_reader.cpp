@@ -251,6 +251,7 @@ void BundleReader::check_model(const ReducedModel& model) {
   if (model.targets) check_targets("/targets", *model.targets);
   if (model.render) attempt([&] { check_barycentric(model.render->barycentric); });
   if (model.skeleton) attempt([&] { check_skeleton(*model.skeleton); });
+  if (model.render && model.skeleton) attempt([&] { check_bones(model); });
   if (model.skeleton && model.full_space) attempt([&] { check_shifts(model); });
   check_elements(model);
   for (const RegionData& region : model.regions) {
@@ -363,6 +364,17 @@ void BundleReader::check_skeleton(const SkeletonData& skeleton) const {
         "/skeleton/first_frames", "/skeleton/times", "/skeleton/poses", "/skeleton/shifts"})
     if (!is_sound(path)) return;
   if (const auto fault = skeleton_fault(skeleton)) refuse(fault->place, fault->expected, fault->found);
+}
+
+void BundleReader::check_bones(const ReducedModel& model) const {
+  for (const char* path : {"/render/bones", "/render/bone_weights", "/skeleton/parents"})
+    if (!is_sound(path)) return;
+  const IndexMatrix& bones = model.render->bones;
+  if (bones.size() > 0 && bones.maxCoeff() >= model.skeleton->parents.size())
+    refuse("/render/bones", fmt::format("bones below {}", model.skeleton->parents.size()),
+           std::to_string(bones.maxCoeff()));
+  if (const auto fault = bone_weights_fault("/render/bone_weights", model.render->bone_weights))
+    refuse(fault->place, fault->expected, fault->found);
 }
 
 void BundleReader::check_shifts(const ReducedModel& model) const {

@@ -93,6 +93,7 @@ class BundleReader {
   void check_elements(const ReducedModel& model);
   void check_barycentric(const RowMatrix& rows) const;
   void check_skeleton(const SkeletonData& skeleton) const;
+  void check_bones(const ReducedModel& model) const;
   void check_shifts(const ReducedModel& model) const;
   bool is_sound(const std::string& place) const { return sound_.contains(place); }
   [[noreturn]] void refuse(const std::string& place, const std::string& expected, const std::string& found,

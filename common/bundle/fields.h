@@ -275,6 +275,8 @@ void visit_render(Render& render, Visitor& visit) {
   visit.dataset("look", render.look);
   visit.dataset("look_vertices", render.look_vertices);
   visit.dataset("look_frames", render.look_frames);
+  visit.dataset("bones", render.bones);
+  visit.dataset("bone_weights", render.bone_weights);
 }
 
 template <typename Skeleton, typename Visitor>

@@ -9,6 +9,8 @@
 namespace exmat {
 namespace {
 
+constexpr double kRounding = 1e-9;  // of a sum, or a length, that is 1
+
 using IntegerRow = Eigen::Matrix<std::int64_t, 1, Eigen::Dynamic>;
 
 // Makes it the next smaller one of the same sum; false where there is none.
@@ -92,8 +94,15 @@ std::optional<ValueFault> check_knots(const Eigen::VectorXd& knots, Eigen::Index
   return std::nullopt;
 }
 
+std::optional<PlacedFault> bone_weights_fault(const std::string& place, const RowMatrix& weights) {
+  for (Eigen::Index v = 0; v < weights.rows(); ++v)
+    if (weights.cols() > 0 && std::abs(weights.row(v).sum() - 1) > kRounding)
+      return PlacedFault{place, fmt::format("numbers that add up to 1 in row {}", v),
+                         fmt::format("{}", weights.row(v).sum())};
+  return std::nullopt;
+}
+
 std::optional<PlacedFault> skeleton_fault(const SkeletonData& skeleton) {
-  constexpr double kRounding = 1e-9;
   const Eigen::Index bones = skeleton.parents.size(), frames = skeleton.times.size();
   if (std::ssize(skeleton.bones) != bones)
     return PlacedFault{"/skeleton@bones", fmt::format("{} names", bones), std::to_string(skeleton.bones.size())};
@@ -104,10 +113,7 @@ std::optional<PlacedFault> skeleton_fault(const SkeletonData& skeleton) {
     if (!(std::abs(skeleton.bind.block<3, 3>(3 * b, 0).determinant()) > 0))
       return PlacedFault{"/skeleton/bind", "axes of bones that can be inverted", fmt::format("others for bone {}", b)};
   }
-  for (Eigen::Index v = 0; v < skeleton.weights.rows(); ++v)
-    if (std::abs(skeleton.weights.row(v).sum() - 1) > kRounding)
-      return PlacedFault{"/skeleton/weights", fmt::format("numbers that add up to 1 in row {}", v),
-                         fmt::format("{}", skeleton.weights.row(v).sum())};
+  if (auto fault = bone_weights_fault("/skeleton/weights", skeleton.weights)) return fault;
   const IndexVector& first = skeleton.first_frames;
   if (first.size() != std::ssize(skeleton.animations) + 1)
     return PlacedFault{"/skeleton@animations", fmt::format("{} names", first.size() - 1),

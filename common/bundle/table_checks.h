@@ -24,4 +24,7 @@ struct PlacedFault {
 };
 std::optional<PlacedFault> skeleton_fault(const SkeletonData& skeleton);
 
+/// Fault of the dataset `place` unless each row of these weights of bones adds up to 1.
+std::optional<PlacedFault> bone_weights_fault(const std::string& place, const RowMatrix& weights);
+
 }  // namespace exmat

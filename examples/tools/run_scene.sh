@@ -2,7 +2,7 @@
 # Precomputes the bundle of an example's scene, steps it and compares what came out with what is expected.
 #   examples/tools/run_scene.sh SCENE.json OUTPUT_FOLDER [FOLDER_OF_PROGRAMS]    (03_car_wall/scene_arc_paper.json)
 # asset_NAME.json and expected_NAME.json lie beside scene_NAME.json; an example of one scene leaves out _NAME. Where there is a surface and
-# no asset, the bundle is made from the surface, and the motion exported beside the trajectory, with eight morph targets.
+# no asset, the bundle is made from the surface, and the motion exported beside the trajectory.
 # Of a scene of several bodies NAME.h5 is made from asset_NAME.json.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
@@ -34,6 +34,6 @@ surface=$(find "$folder" -maxdepth 1 -name '*.glb')
 "$programs/exmat-runtime" run "$output/scene$variant.json"
 if [ "$asset" = "$surface" ]; then
   trajectory=$output/$(member trajectory)
-  "$programs/exmat-runtime" export "$trajectory" -o "${trajectory%.h5}.glb" --targets 8
+  "$programs/exmat-runtime" export "$trajectory" -o "${trajectory%.h5}.glb"
 fi
 "$here/expect.py" "$folder/expected$variant.json" "$output/$(member trajectory)"

@@ -132,6 +132,19 @@ FileNumbers numbers_of(const CheckedMesh& checked) {
   return {checked.report.kept_vertices, checked.file_vertices.rows()};
 }
 
+// Adds how the vertices of a render mesh hang on bones, by weights of each bone [v x b].
+void add_bones(const RowMatrix& weights, RenderData& render) {
+  const Eigen::Index most = (weights.array() > 0).rowwise().count().maxCoeff();
+  render.bones.setZero(weights.rows(), most);
+  render.bone_weights.setZero(weights.rows(), most);
+  for (Eigen::Index v = 0; v < weights.rows(); ++v)
+    for (Eigen::Index b = 0, k = 0; b < weights.cols(); ++b) {
+      if (!(weights(v, b) > 0)) continue;
+      render.bones(v, k) = static_cast<std::int32_t>(b);
+      render.bone_weights(v, k++) = weights(v, b);
+    }
+}
+
 // Adds the look of a render mesh that comes from glTF.
 void add_look(const AssetConfig& asset, InputFiles& files, std::vector<std::string>& warnings, RenderData& render) {
   const std::string extension = lower_extension(*asset.render_mesh);
@@ -473,6 +486,9 @@ RenderData read_render_mesh(const AssetConfig& asset, const ObjectInput& object,
   render.triangles = std::move(surface.triangles);
   render.outside = embedding.outside;
   render.farthest = embedding.farthest;
+  render.bones.resize(render.tets.size(), 0);
+  render.bone_weights.resize(render.tets.size(), 0);
+  if (is_object && object.surface->file().skeleton) add_bones(object.surface->file().skeleton->weights, render);
   add_look(asset, files, warnings, render);
   return render;
 }

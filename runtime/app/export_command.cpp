@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
 #include <map>
 #include <numbers>
@@ -10,14 +11,17 @@
 #include "common/mesh/geometry.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/print.h"
+#include "runtime/export/drawn_skin.h"
 #include "runtime/export/point_cache.h"
 #include "runtime/export/surface_look.h"
+#include "runtime/export/surface_motion.h"
 #include "runtime/export/usd_file.h"
 
 namespace exmat::runtime {
 namespace {
 
 constexpr double kMegabyte = 1e6;
+constexpr double kMotionTolerance = 1e-6;  // RMS, of the size: what components leave out of a motion
 constexpr double kDegree = std::numbers::pi / 180;
 
 [[noreturn]] void refuse_option(const ExportOptions& options, const std::string& expected, const std::string& found) {
@@ -76,10 +80,13 @@ std::filesystem::path bundle_of(const ExportOptions& options, const TrajectoryRe
 }
 
 void print_targets(const MorphTargets& targets, const DrawnSurface& surface) {
-  const char* const kind = targets.displacements.cols() < surface.mode_count() ? "principal components" : "modes";
+  const bool cut = targets.displacements.cols() < surface.mode_count();
+  const std::string kind = cut ? "principal components" : fmt::format("{}s", surface.mode_name);
   print("surface", fmt::format("{} vertices, {} triangles of {}", surface.vertex_count(), surface.triangles.rows(),
                                surface.source));
   print("morph targets", fmt::format("{}, {}", targets.displacements.cols(), kind));
+  if (surface.skin)
+    print("skin", fmt::format("{} bones as its file has them, which move by themselves", surface.skin->names.size()));
   if (!surface.look) return;
   const auto count = [&](const char* name) {
     return surface.look->document.value(name, nlohmann::json::array()).size();
@@ -87,7 +94,10 @@ void print_targets(const MorphTargets& targets, const DrawnSurface& surface) {
   print("look", fmt::format("{} materials and {} images, as its file has them", count("materials"), count("images")));
 }
 
-void print_error(const MorphError& error, const DrawnSurface& surface) {
+/// `beside`: what the motion has beside the modes.
+void print_error(MorphError error, const MorphError& beside, const DrawnSurface& surface) {
+  error.largest += beside.largest;
+  error.rms = std::hypot(error.rms, beside.rms);
   const double size = bounding_box_diagonal(surface.vertices);
   print("error", fmt::format("largest {:.2g} m ({:.2g} of the size), RMS {:.2g} m ({:.2g})", error.largest,
                              error.largest / size, error.rms, error.rms / size));
@@ -98,15 +108,13 @@ void print_error(const MorphError& error, const DrawnSurface& surface) {
 struct Drawing {
   std::vector<DrawnKind> kinds;
   std::vector<RowMatrix> reduced;  ///< one for each kind: q of all frames of its bodies, one body after the other
+  std::vector<MorphError> beside;  ///< one for each kind: what their motion has beside the modes
   std::vector<DrawnBody> bodies;
+  std::vector<SurfaceMotion> motions;  ///< one for each body; empty where its modes say all
 };
 
 DrawnKind read_kind(const ExportOptions& options, const std::filesystem::path& bundle) {
-  DrawnKind kind{read_drawn_surface(bundle, options.mesh), {}, {}};
-  if (options.targets && *options.targets > kind.surface.mode_count())
-    refuse_option(options, fmt::format("at most {} targets, as the bundle has modes", kind.surface.mode_count()),
-                  fmt::format("{}", *options.targets));
-  return kind;
+  return {read_drawn_surface(bundle, options.mesh), {}, {}};
 }
 
 /// Its body as it is selected.
@@ -115,13 +123,13 @@ void add_body(const ExportOptions& options, const std::string& name, TrajectoryR
   BodyMotion motion = read_body_motion(trajectory);
   const auto [known, is_new] =
       kinds.try_emplace(trajectory.text("bundle") + '\n' + trajectory.text("input_sha256"), drawing.kinds.size());
-  if (is_new) {
-    drawing.kinds.push_back(read_kind(options, bundle_of(options, trajectory)));
-  }
-  const DrawnSurface& surface = drawing.kinds[known->second].surface;
+  if (is_new) drawing.kinds.push_back(read_kind(options, bundle_of(options, trajectory)));
+  DrawnSurface& surface = drawing.kinds[known->second].surface;
   if (motion.reduced.cols() != surface.mode_count())
     trajectory.refuse("/reduced", fmt::format("{} columns", surface.mode_count()),
                       fmt::format("{}", motion.reduced.cols()));
+  if (surface.skin && motion.bones.cols() != 7 * std::ssize(surface.skin->names)) surface.skin.reset();
+  drawing.motions.push_back(motion.full ? read_surface_motion(trajectory, surface, motion) : SurfaceMotion());
   drawing.bodies.push_back({name.empty() ? surface.name : name, known->second, {}, std::move(motion)});
 }
 
@@ -140,11 +148,55 @@ RowMatrix reduced_of(const Drawing& drawing, std::size_t kind) {
   return reduced;
 }
 
+/// Puts the principal components of a kind's motions in place of its modes, where a body of it was in full space.
+MorphError take_components(Drawing& drawing, std::size_t kind) {
+  DrawnSurface& surface = drawing.kinds[kind].surface;
+  Eigen::Index frames = 0;
+  bool full = false;
+  MorphError beside;
+  for (std::size_t i = 0; i < drawing.bodies.size(); ++i) {
+    if (!drawing.bodies[i].motion || drawing.bodies[i].kind != kind) continue;
+    frames += drawing.bodies[i].motion->frames();
+    full = full || drawing.bodies[i].motion->full;
+    beside.largest = std::max(beside.largest, drawing.motions[i].missed);
+  }
+  if (!full) return beside;
+  Eigen::MatrixXd all(surface.modes.rows(), frames);
+  frames = 0;
+  for (std::size_t i = 0; i < drawing.bodies.size(); ++i) {
+    if (drawing.bodies[i].kind != kind) continue;
+    const BodyMotion& motion = *drawing.bodies[i].motion;
+    auto own = all.middleCols(frames, motion.frames());
+    if (motion.full)
+      own = drawing.motions[i].displacements;
+    else
+      own = surface.modes * motion.reduced.transpose();
+    frames += motion.frames();
+  }
+  MotionComponents components = components_of(all, kMotionTolerance * bounding_box_diagonal(surface.vertices));
+  beside.largest += components.largest;
+  beside.rms = components.rms;
+  surface.modes = std::move(components.modes);
+  surface.mode_name = "component";
+  frames = 0;
+  for (DrawnBody& body : drawing.bodies) {
+    if (body.kind != kind) continue;
+    body.motion->reduced = components.reduced.middleRows(frames, body.motion->frames());
+    frames += body.motion->frames();
+  }
+  return beside;
+}
+
 /// Morph targets of each kind for the motions of all its bodies, and the weights of each body.
 void find_targets(const ExportOptions& options, Drawing& drawing) {
   std::vector<Eigen::Index> used(drawing.kinds.size(), 0);
   for (std::size_t i = 0; i < drawing.kinds.size(); ++i) {
     DrawnKind& kind = drawing.kinds[i];
+    drawing.beside.push_back(take_components(drawing, i));
+    const Eigen::Index modes = kind.surface.mode_count();
+    if (options.targets && *options.targets > modes)
+      refuse_option(options, fmt::format("at most {} targets, as there are {}s", modes, kind.surface.mode_name),
+                    fmt::format("{}", *options.targets));
     drawing.reduced.push_back(reduced_of(drawing, i));
     const VertexNormals normals = normals_of(kind.surface);
     kind.normals = normals.at(kind.surface.vertices);
@@ -198,7 +250,7 @@ void export_gltf(const ExportOptions& options) {
     print_targets(kind.targets, kind.surface);
     if (cached == 0) continue;
     const VertexNormals normals = normals_of(kind.surface);
-    print_error(error_of(kind.targets, kind.surface, normals, drawing.reduced[i]), kind.surface);
+    print_error(error_of(kind.targets, kind.surface, normals, drawing.reduced[i]), drawing.beside[i], kind.surface);
   }
   const auto megabytes = static_cast<double>(bytes) / kMegabyte;
   if (!drawing.bodies.front().motion) {

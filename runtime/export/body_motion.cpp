@@ -11,6 +11,8 @@ BodyMotion read_body_motion(TrajectoryReader& trajectory) {
   motion.reduced = trajectory.read("/reduced");
   motion.positions = trajectory.read("/body/position");
   motion.orientations = trajectory.read("/body/orientation");
+  if (trajectory.has("/bones")) motion.bones = trajectory.read("/bones");
+  motion.full = trajectory.integer("full_frames") > 0;
   for (Eigen::Index frame = 0; frame < motion.frames(); ++frame) {
     motion.orientations.row(frame).normalize();
     if (frame > 0 && motion.orientations.row(frame).dot(motion.orientations.row(frame - 1)) < 0)

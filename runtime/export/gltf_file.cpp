@@ -22,6 +22,7 @@
 #include "common/core/version.h"
 #include "common/mesh/geometry.h"
 #include "common/surface_io/glb.h"
+#include "runtime/export/drawn_skin.h"
 #include "runtime/export/surface_look.h"
 
 namespace exmat::runtime {
@@ -85,6 +86,28 @@ void for_each(Object& object, const char* member, const Use& use) {
     for (auto& element : *found) use(element);
 }
 
+/// A node's transform to what is above it.
+Eigen::Affine3d transform_of(const Json& node) {
+  Eigen::Affine3d transform = Eigen::Affine3d::Identity();
+  const auto numbers = [&](const char* member) { return node.at(member).get<std::vector<double>>(); };
+  if (node.contains("matrix")) {
+    for (std::size_t k = 0; k < 16; ++k)
+      transform.matrix()(static_cast<Eigen::Index>(k % 4), static_cast<Eigen::Index>(k / 4)) = numbers("matrix").at(k);
+    return transform;
+  }
+  const auto vector = [&](const char* member) {
+    const std::vector<double> all = numbers(member);
+    return Eigen::Vector3d(all.at(0), all.at(1), all.at(2));
+  };
+  if (node.contains("translation")) transform.translate(vector("translation"));
+  if (node.contains("rotation"))
+    transform.rotate(Eigen::Quaterniond(numbers("rotation").at(3), vector("rotation")[0], vector("rotation")[1],
+                                        vector("rotation")[2])
+                         .normalized());
+  if (node.contains("scale")) transform.scale(vector("scale"));
+  return transform;
+}
+
 class GltfWriter {
  public:
   explicit GltfWriter(std::string file) : file_(std::move(file)) {
@@ -109,6 +132,7 @@ class GltfWriter {
     Json& nodes = root_["nodes"];
     if (up == UpAxis::kZ) nodes.push_back({{"name", "y up"}, {"rotation", {-std::sqrt(0.5), 0, 0, std::sqrt(0.5)}}});
     origin_ = origin_of(kinds, bodies);
+    Json skinned = Json::array();  // meshes with a skin stand by themselves, for nodes above them count for nothing
     const std::size_t above = nodes.size();
     if (!origin_.isZero(0)) nodes.push_back({{"name", "origin"}, {"translation", json_of(origin_)}});
     Json list = Json::array();
@@ -118,12 +142,16 @@ class GltfWriter {
       body.node = nodes.size();
       list.push_back(body.node);
       nodes.push_back({{"name", drawn.name}, {"translation", json_of(surface.origin - origin_)}});
-      add_drawn_nodes(kinds_[drawn.kind], surface.origin, body);
+      if (surface.skin)
+        add_skinned_nodes(kinds_[drawn.kind], surface, body, skinned);
+      else
+        add_drawn_nodes(kinds_[drawn.kind], surface.origin, body);
       if (bodies.size() == 1 || drawn.weights.rows() == 0) continue;
       for (const std::size_t node : body.meshes) nodes[node]["weights"] = first_of(drawn.weights);
     }
     if (!origin_.isZero(0)) nodes[above]["children"] = std::exchange(list, Json::array({above}));
     if (up == UpAxis::kZ) nodes.front()["children"] = std::exchange(list, Json::array({0}));
+    for (Json& node : skinned) list.push_back(std::move(node));
     root_["scenes"] = {{{"nodes", list}}};
   }
 
@@ -161,6 +189,7 @@ class GltfWriter {
   struct Body {
     std::size_t node = 0;
     std::vector<std::size_t> meshes;  ///< nodes with one
+    std::size_t first_bone = 0;       ///< node of the first of its bones, which the others follow
   };
 
   std::size_t size_of(const char* list) const { return root_.contains(list) ? root_[list].size() : 0; }
@@ -182,6 +211,7 @@ class GltfWriter {
     primitive["indices"] = add_indices(surface.triangles, surface.vertex_count());
     primitive["attributes"]["POSITION"] = add_floats(surface.vertices.cast<float>(), "VEC3", kVertices, true);
     primitive["attributes"]["NORMAL"] = add_floats(normals.cast<float>(), "VEC3", kVertices);
+    if (surface.skin) add_influences(*surface.skin, 0, surface.vertex_count(), primitive);
     for (Eigen::Index k = 0; k < targets.displacements.cols(); ++k)
       primitive["targets"].push_back(
           {{"POSITION", add_floats(vectors_of(targets.displacements, k), "VEC3", kVertices, true)},
@@ -300,6 +330,7 @@ class GltfWriter {
     };
     if (!primitive["attributes"].contains("NORMAL"))
       primitive["attributes"]["NORMAL"] = add_floats((scale.asDiagonal() * rest).cast<float>(), "VEC3", kVertices);
+    if (surface.skin) add_influences(*surface.skin, place.first, place.count, primitive);
     primitive["targets"] = Json::array();
     for (Eigen::Index k = 0; k < targets.displacements.cols(); ++k) {
       const FloatMatrix moved = in_mesh(targets.displacements, k, to_mesh).cast<float>();
@@ -333,6 +364,82 @@ class GltfWriter {
     for (const Json& root : kind.roots) nodes[above]["children"].push_back(root.get<std::size_t>() + first);
   }
 
+  /// Adds the bones of a body below its node, and its meshes as nodes of the scene.
+  void add_skinned_nodes(const Kind& kind, const DrawnSurface& surface, Body& body, Json& scene) {
+    Json& nodes = root_["nodes"];
+    const DrawnSkin& skin = *surface.skin;
+    body.first_bone = nodes.size();
+    Json joints = Json::array();
+    for (std::size_t b = 0; b < skin.names.size(); ++b) {
+      const Eigen::Isometry3d place = below_parent(surface, skin.bind, b);
+      const int parent = skin.parents[static_cast<Eigen::Index>(b)];
+      const std::size_t above = parent < 0 ? body.node : body.first_bone + static_cast<std::size_t>(parent);
+      joints.push_back(nodes.size());
+      nodes[above]["children"].push_back(nodes.size());
+      nodes.push_back({{"name", skin.names[b]},
+                       {"translation", json_of(place.translation())},
+                       {"rotation", json_of(Eigen::Quaterniond(place.linear()).coeffs())}});
+    }
+    const auto add = [&](Json node, const Eigen::Affine3d& mesh_to_rest) {
+      FloatMatrix matrices(std::ssize(skin.bind), 16);
+      for (std::size_t b = 0; b < skin.bind.size(); ++b) {
+        const Eigen::Matrix4d matrix = (skin.bind[b].inverse() * mesh_to_rest).matrix();
+        matrices.row(static_cast<Eigen::Index>(b)) = matrix.reshaped().cast<float>();
+      }
+      node["skin"] = size_of("skins");
+      root_["skins"].push_back({{"joints", joints}, {"inverseBindMatrices", add_floats(matrices, "MAT4", kOther)}});
+      body.meshes.push_back(nodes.size());
+      scene.push_back(nodes.size());
+      nodes.push_back(std::move(node));
+    };
+    if (kind.nodes.empty())
+      return add({{"name", surface.name}, {"mesh", kind.first_mesh}},
+                 Eigen::Affine3d(Eigen::Translation3d(surface.origin)));
+    const auto visit = [&](const auto& self, const Json& node, const Eigen::Affine3d& above) -> void {
+      const Eigen::Affine3d place = above * transform_of(node);
+      if (node.contains("mesh")) {
+        Json drawn = {{"mesh", node["mesh"].get<std::size_t>() + kind.first_mesh}};
+        for (const char* member : {"name", "extras"})
+          if (node.contains(member)) drawn[member] = node[member];
+        add(std::move(drawn), place);
+      }
+      for_each(node, "children",
+               [&](const Json& child) { self(self, kind.nodes.at(child.get<std::size_t>()), place); });
+    };
+    for (const Json& root : kind.roots)
+      visit(visit, kind.nodes.at(root.get<std::size_t>()), Eigen::Affine3d::Identity());
+  }
+
+  /// From a bone to its parent or, of a root, to its body's node, with bones where they are in the world.
+  static Eigen::Isometry3d below_parent(const DrawnSurface& surface, const std::vector<Eigen::Isometry3d>& bones,
+                                        std::size_t bone) {
+    const int parent = surface.skin->parents[static_cast<Eigen::Index>(bone)];
+    if (parent >= 0) return bones[static_cast<std::size_t>(parent)].inverse() * bones[bone];
+    return Eigen::Translation3d(-surface.origin) * bones[bone];
+  }
+
+  void add_bone_channels(const DrawnSurface& surface, const BodyMotion& motion, const Body& body, Json& animation) {
+    const std::size_t bones = surface.skin->names.size();
+    std::vector<FloatMatrix> joints(bones, FloatMatrix(motion.frames(), 3)),
+        turns(bones, FloatMatrix(motion.frames(), 4));
+    std::vector<Eigen::Quaterniond> last(bones, Eigen::Quaterniond::Identity());
+    for (Eigen::Index frame = 0; frame < motion.frames(); ++frame) {
+      const std::vector<Eigen::Isometry3d> all = placed(*surface.skin, motion.bones.row(frame));
+      for (std::size_t b = 0; b < bones; ++b) {
+        const Eigen::Isometry3d place = below_parent(surface, all, b);
+        Eigen::Quaterniond turn(place.linear());
+        if (turn.dot(last[b]) < 0) turn.coeffs() *= -1;
+        last[b] = turn;
+        joints[b].row(frame) = place.translation().cast<float>();
+        turns[b].row(frame) = turn.coeffs().cast<float>();
+      }
+    }
+    for (std::size_t b = 0; b < bones; ++b) {
+      add_channels(animation, {body.first_bone + b}, "translation", add_floats(joints[b], "VEC3", kOther));
+      add_channels(animation, {body.first_bone + b}, "rotation", add_floats(turns[b], "VEC4", kOther));
+    }
+  }
+
   void add_times(const Eigen::VectorXd& seconds) {
     const FloatMatrix times = seconds.cast<float>();
     for (Eigen::Index frame = 1; frame < times.size(); ++frame)
@@ -345,6 +452,9 @@ class GltfWriter {
 
   void add_channels(const DrawnSurface& surface, const DrawnBody& drawn, const Body& body, Json& animation) {
     const BodyMotion& motion = *drawn.motion;
+    const FloatMatrix weights = drawn.weights.cast<float>().reshaped<Eigen::RowMajor>();
+    add_channels(animation, body.meshes, "weights", add_floats(weights, "SCALAR", kOther));
+    if (surface.skin) return add_bone_channels(surface, motion, body, animation);
     const RowMatrix places = places_of(surface, motion).rowwise() - origin_.transpose();
     const RowMatrix& turns = motion.orientations;
     if (!(places.rowwise() - places.row(0)).isZero(0) || !motion.positions.row(0).isZero(0))
@@ -354,8 +464,6 @@ class GltfWriter {
       quaternions << turns.rightCols(3).cast<float>(), turns.leftCols(1).cast<float>();
       add_channels(animation, {body.node}, "rotation", add_floats(quaternions, "VEC4", kOther));
     }
-    const FloatMatrix weights = drawn.weights.cast<float>().reshaped<Eigen::RowMajor>();
-    add_channels(animation, body.meshes, "weights", add_floats(weights, "SCALAR", kOther));
   }
 
   /// One sampler, and a channel for each of the nodes.
@@ -399,6 +507,18 @@ class GltfWriter {
         accessor["max"].push_back(column.maxCoeff());
       }
     return size_of("accessors") - 1;
+  }
+
+  /// The bones of some of the surface's vertices.
+  void add_influences(const DrawnSkin& skin, Eigen::Index first, Eigen::Index count, Json& primitive) {
+    using Shorts = Eigen::Matrix<std::uint16_t, Eigen::Dynamic, 4, Eigen::RowMajor>;
+    Shorts bones = Shorts::Zero(count, 4);
+    bones.leftCols(skin.bones.cols()) = skin.bones.middleRows(first, count).cast<std::uint16_t>();
+    FloatMatrix weights = FloatMatrix::Zero(count, 4);
+    weights.leftCols(skin.weights.cols()) = skin.weights.middleRows(first, count).cast<float>();
+    add_array(bones, kVertices, kUnsignedShort, "VEC4")["count"] = count;
+    primitive["attributes"]["JOINTS_0"] = size_of("accessors") - 1;
+    primitive["attributes"]["WEIGHTS_0"] = add_floats(weights, "VEC4", kVertices);
   }
 
   std::size_t add_indices(const TriangleArray& triangles, Eigen::Index vertices) {

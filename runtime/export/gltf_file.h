@@ -35,7 +35,8 @@ struct DrawnBody {
 Eigen::Vector3d origin_of(const std::vector<DrawnKind>& kinds, const std::vector<DrawnBody>& bodies);
 
 /// Writes surfaces with morph targets as binary glTF 2.0, in single precision: a mesh for each kind, a node for each
-/// body. With motions an animation of the nodes and of their weights, linear between frames. Z up becomes glTF's y up
+/// body; the bones of a skin are nodes below its body's, and its meshes stand beside. With motions an animation of the
+/// nodes, bones and weights, linear between frames. Z up becomes glTF's y up
 /// by a node above all, and a node "origin" holds origin_of() where that is not 0. Returns the bytes written. Throws
 /// InputError (frames too close for single precision or at other times than those of the other bodies, more than the
 /// format holds) and WorkError; `target` is then as it was.

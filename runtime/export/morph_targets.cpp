@@ -117,7 +117,7 @@ MorphTargets targets_of_motion(const DrawnSurface& surface, const VertexNormals&
   } else {
     targets.displacements = surface.modes;
     targets.weights = reduced;
-    targets.names = names_of("mode", targets.weights.cols());
+    targets.names = names_of(surface.mode_name, targets.weights.cols());
   }
   scale_weights_to_one(targets);
   targets.normals = normals.derivatives(surface.vertices, targets.displacements);

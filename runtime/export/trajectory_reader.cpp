@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <functional>
 #include <limits>
+#include <numeric>
 #include <span>
 
 #include "common/bundle/file_schemas.h"
@@ -32,7 +34,7 @@ Hdf5File open(const std::filesystem::path& trajectory) {
 template <typename Array>
 void resize(Array& array, const std::vector<std::int64_t>& sizes) {
   if constexpr (Array::ColsAtCompileTime == Eigen::Dynamic)
-    array.resize(sizes.front(), sizes.size() > 1 ? sizes.back() : 1);
+    array.resize(sizes.front(), std::accumulate(sizes.begin() + 1, sizes.end(), std::int64_t{1}, std::multiplies()));
   else
     array.resize(sizes.front(), Array::ColsAtCompileTime);
 }
@@ -67,6 +69,15 @@ std::string TrajectoryReader::text(const std::string& attribute) const {
   const auto* text = std::get_if<std::string>(&value);
   if (text == nullptr) refuse(group_ + "/@" + attribute, "a string", "another type");
   return *text;
+}
+
+std::int64_t TrajectoryReader::integer(const std::string& attribute) const {
+  const std::string object = group_.empty() ? "/" : group_;
+  if (!file_.has_attribute(object, attribute)) return 0;
+  const AttributeValue value = file_.read_attribute(object, attribute);
+  const auto* number = std::get_if<std::int64_t>(&value);
+  if (number == nullptr) refuse(group_ + "/@" + attribute, "a whole number", "another type");
+  return *number;
 }
 
 Eigen::Vector3d TrajectoryReader::origin() const {

@@ -26,9 +26,11 @@ class TrajectoryReader {
   bool has(const std::string& dataset) const { return file_.has_dataset(group_ + dataset); }
   /// An attribute of the run, or of the body; empty where the trajectory is older than it.
   std::string text(const std::string& attribute) const;
+  /// Likewise a whole number; 0 where the trajectory is older than it.
+  std::int64_t integer(const std::string& attribute) const;
   /// Point that positions are measured from [m].
   Eigen::Vector3d origin() const;
-  /// All rows of a dataset of numbers, F x columns.
+  /// All rows of a dataset of numbers, F x the numbers of each.
   RowMatrix read(const std::string& dataset);
   /// Triangles of the render mesh, or of the boundary of the tets.
   TriangleArray triangles(bool mesh);

@@ -24,6 +24,7 @@ SymbolSizes sizes_of(const ReducedModel& model, const TrajectoryInfo& info) {
   sizes.set("n_t", model.object->mesh.tet_count(), "the bundle");
   sizes.set("r", model.modal->basis.cols(), "the bundle");
   if (info.attachments > 0) sizes.set("a", info.attachments, "the scene");
+  if (model.skeleton) sizes.set("b", std::ssize(model.skeleton->bones), "the bundle");
   if (!model.render) return sizes;
   sizes.set("v", model.render->tets.size(), "the bundle");
   sizes.set("f", model.render->triangles.rows(), "the bundle");
@@ -84,6 +85,7 @@ void BodyFrames::append(const State& state, const Energies& energies, double ste
   const Eigen::Quaterniond& turn = motion.orientation;
   const std::array orientation{turn.w(), turn.x(), turn.y(), turn.z()};
   times_.push_back(state.time);
+  if (state.full) ++full_frames_;
   datasets_->time.append(state.time);
   append_positions(state);
   datasets_->reduced->append(row_of(state.q));
@@ -96,6 +98,14 @@ void BodyFrames::append(const State& state, const Energies& energies, double ste
   datasets_->step_time.append(step_seconds);
   for (std::size_t i = 0; i < info_.weights.size(); ++i)
     datasets_->weights[i].append(row_of(state.examples[info_.weights[i].force].weights));
+  if (datasets_->bones) {
+    Eigen::Matrix<double, 7, Eigen::Dynamic> bones(7, std::ssize(state.full->skeleton->bones));
+    for (Eigen::Index b = 0; b < bones.cols(); ++b) {
+      const BonePose& bone = state.full->skeleton->bones[static_cast<std::size_t>(b)];
+      bones.col(b) << bone.joint, bone.turn.w(), bone.turn.vec();
+    }
+    datasets_->bones->append(row_of(bones));
+  }
   if (info_.attachments == 0) return;
   Eigen::Matrix3Xd forces(3, info_.attachments), torques = forces;
   for (Eigen::Index i = 0; i < forces.cols(); ++i) {
@@ -159,6 +169,7 @@ void BodyFrames::append_render_mesh(const VertexArray& positions) {
 }
 
 void BodyFrames::finish() {
+  file_.write_attribute(group_.empty() ? "/" : group_, "full_frames", full_frames_);
   datasets_->finish();
   datasets_.reset();
 }
@@ -182,6 +193,7 @@ TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path, const std:
     file_.write_attribute("/", "integrator", first.info.integrator);
     file_.write_attribute("/", "time_step", first.info.time_step);
     file_.write_attribute("/", "origin", std::vector<double>(3));
+    file_.write_attribute("/", "full_frames", std::int64_t{0});
     write_group(file_, group_schema("/bodies"), "/bodies");
   }
   for (const NamedBody& body : bodies) {

@@ -76,6 +76,7 @@ class BodyFrames {
   Eigen::VectorXd rest_masses_;             ///< n_t
   VertexArray displacements_, velocities_;  ///< n x 3
   std::vector<double> times_;
+  std::int64_t full_frames_ = 0;  ///< in which the body was in full space
   double largest_displacement_ = 0;
 };
 

@@ -46,7 +46,7 @@ void TrajectoryRows::finish() {
     dataset->finish();
   for (RowWriter& dataset : weights) dataset.finish();
   for (std::optional<RowWriter>* dataset :
-       {&reduced, &reduced_velocity, &attachment_forces, &attachment_torques, &render})
+       {&reduced, &reduced_velocity, &attachment_forces, &attachment_torques, &bones, &render})
     if (*dataset) (*dataset)->finish();
 }
 

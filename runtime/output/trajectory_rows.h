@@ -28,7 +28,7 @@ void write_body_groups(Hdf5File& file, const std::string& parent, const SymbolSi
 class TrajectoryRows {
  public:
   /// Below `group`, as write_body_groups(), which comes first. Bound r: with reduced coordinates; v: with the render
-  /// mesh; a: with attachments.
+  /// mesh; a: with attachments; b: with bones.
   TrajectoryRows(Hdf5File& file, const std::string& group, const SymbolSizes& sizes,
                  const std::vector<WeightInfo>& forces);
   TrajectoryRows(const TrajectoryRows&) = delete;
@@ -64,6 +64,7 @@ class TrajectoryRows {
   RowWriter step_time = rows("/step_time");
   std::optional<RowWriter> attachment_forces = rows_if("a", "/attachments/force");
   std::optional<RowWriter> attachment_torques = rows_if("a", "/attachments/torque");
+  std::optional<RowWriter> bones = rows_if("b", "/bones");
   std::vector<RowWriter> weights;   ///< in the order of `forces`
   std::optional<RowWriter> render;  ///< vertices of the render mesh
 };

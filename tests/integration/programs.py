@@ -1,6 +1,7 @@
 """What tests of programs share: a mesh, a surface, and runs that have to end as they should."""
 import itertools
 import json
+import struct
 import subprocess
 from pathlib import Path
 
@@ -35,6 +36,53 @@ def tube(length=3.0, steps=24, around=16):
                   + [t for ring in range(steps) for t in ((at(ring, k), at(ring, k + 1), at(ring + 1, k + 1)),
                                                           (at(ring, k), at(ring + 1, k + 1), at(ring + 1, k)))])]
     return points, np.array(triangles)
+
+
+def write_skinned(path, bulge=0.0):
+    """A .glb of a tube on three bones of 1 m in a row, whose weights go over within 0.3 m; an animation turns each by 30 degrees about z,
+    and back. A morph target bulges the middle."""
+    points, triangles = tube()
+    bones = 3
+    document = {"asset": {"version": "2.0"}, "scene": 0, "accessors": [], "bufferViews": []}
+    binary = bytearray()
+
+    def accessor(array, kind, code):
+        document["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": array.nbytes})
+        binary.extend(array.tobytes())
+        binary.extend(b"\0" * (-len(binary) % 4))
+        document["accessors"].append({"bufferView": len(document["bufferViews"]) - 1, "componentType": code, "count": len(array),
+                                      "type": kind})
+        return len(document["accessors"]) - 1
+
+    floats = lambda array, kind: accessor(np.ascontiguousarray(array, np.float32), kind, 5126)
+    bone = np.clip(points[:, 0].astype(int), 0, bones - 1)
+    to_next = np.where(bone < bones - 1, np.clip((points[:, 0] - bone - 0.7) / 0.3, 0, 1) / 2, 0)
+    to_last = np.where(bone > 0, np.clip((0.3 - (points[:, 0] - bone)) / 0.3, 0, 1) / 2, 0)
+    joints = np.stack([bone, np.minimum(bone + 1, bones - 1), np.maximum(bone - 1, 0), bone], 1).astype(np.uint8)
+    weights = np.stack([1 - to_next - to_last, to_next, to_last, 0 * to_last], 1)
+    document["meshes"] = [{"primitives": [{
+        "attributes": {"POSITION": floats(points, "VEC3"), "JOINTS_0": accessor(joints, "VEC4", 5121), "WEIGHTS_0": floats(weights, "VEC4")},
+        "indices": accessor(np.ascontiguousarray(triangles.ravel(), np.uint32), "SCALAR", 5125)}]}]
+    if bulge:
+        out = bulge * np.exp(-((points[:, 0] - 1.5) / 0.3) ** 2)[:, None] * points * [0, 1, 1]
+        document["meshes"][0]["primitives"][0]["targets"] = [{"POSITION": floats(out, "VEC3")}]
+        document["meshes"][0]["extras"] = {"targetNames": ["flex"]}
+    inverse = np.tile(np.eye(4), (bones, 1, 1))
+    inverse[:, 0, 3] = -np.arange(bones)
+    document["skins"] = [{"joints": [1, 2, 3], "inverseBindMatrices": floats(inverse.transpose(0, 2, 1).reshape(-1, 16), "MAT4")}]
+    document["nodes"] = [{"mesh": 0, "skin": 0}, {"name": "root", "children": [2]},
+                         {"name": "middle", "translation": [1, 0, 0], "children": [3]}, {"name": "tip", "translation": [1, 0, 0]}]
+    document["scenes"] = [{"nodes": [0, 1]}]
+    half = np.radians(30) / 2
+    times = floats(np.array([0, 0.5, 1.0]), "SCALAR")
+    turns = floats(np.array([[0, 0, 0, 1], [0, 0, np.sin(half), np.cos(half)], [0, 0, 0, 1]]), "VEC4")
+    document["animations"] = [{"name": "curl", "samplers": [{"input": times, "output": turns}],
+                               "channels": [{"sampler": 0, "target": {"node": node, "path": "rotation"}} for node in (1, 2, 3)]}]
+    document["buffers"] = [{"byteLength": len(binary)}]
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    path.write_bytes(struct.pack("<III", 0x46546C67, 2, 28 + len(text) + len(binary)) + struct.pack("<II", len(text), 0x4E4F534A) + text
+                     + struct.pack("<II", len(binary), 0x004E4942) + bytes(binary))
 
 
 def write_bar(folder):

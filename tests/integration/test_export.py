@@ -20,7 +20,7 @@ import numpy as np
 import vtk
 from vtk.util.numpy_support import vtk_to_numpy
 
-from programs import bar, call, write_bar, write_json
+from programs import bar, call, write_bar, write_json, write_skinned
 
 PROGRAMS = Path(sys.argv.pop(1)).resolve()
 KEPT = Path(sys.argv.pop()) if "--keep" in sys.argv else None
@@ -53,7 +53,7 @@ def contents(path):
     for accessor in document["accessors"]:
         view = document["bufferViews"][accessor["bufferView"]]
         kind = {5126: np.float32, 5123: np.uint16, 5125: np.uint32}[accessor["componentType"]]
-        width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor["type"]]
+        width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4, "MAT4": 16}[accessor["type"]]
         offset = view.get("byteOffset", 0)
         array = np.frombuffer(binary[offset:offset + view["byteLength"]], kind).reshape(-1, width)
         assert len(array) == accessor["count"]
@@ -157,6 +157,76 @@ class Export(unittest.TestCase):
                 self.check(name)
                 x = self.trajectory(name)["render/vertices"]
                 self.assertGreater(np.linalg.norm(x - x[0], axis=2).max(), 0.3)  # it moves
+
+    def bundle_in_full_space(self, name, source, **more):
+        asset = json.loads((self.folder / f"{source}.json").read_text())
+        write_json(self.folder / f"{name}.json", {**asset, "needs": [*asset["needs"], "full_space"], **more})
+        self.call(PRECOMPUTE, "bundle", f"{name}.json", "-o", f"{name}.h5")
+
+    def test_a_body_in_full_space_is_drawn_as_it_was(self):
+        """Also where its modes are elsewhere, as under a hand that pulls at a corner, and for bodies of which one is reduced."""
+        self.bundle_in_full_space("touched", "clamped")
+        self.bundle_in_full_space("thrown", "free")
+        hand = {"forces": [{"vertices": {"ids": [80]}, "force": [0, 0, 400], "start": 0, "end": 0.5}], "space": "full"}
+        self.run_scene("touched", hand)
+        self.run_scene("thrown", {**hand, "body": {"angular_velocity": [1, 4, 9], "linear_velocity": [3, 5, 0]}})
+        for name in ("touched", "thrown"):
+            with self.subTest(name), h5py.File(self.folder / f"{name}_run.h5") as run, h5py.File(self.folder / f"{name}.h5") as bundle:
+                self.assertGreaterEqual(run.attrs["full_frames"], 20)  # all, or all after the start
+                printed = self.export(f"{name}_run.h5", "-o", "motion.glb")
+                self.assertRegex(printed, r"morph targets +\d+, components")
+                missed = self.check(name)
+                largest = float(re.search(r"largest (\S+) m", printed)[1])
+                self.assertLess(missed.max(), 1.1 * largest + 1e-6)  # of the trajectory's own rounding
+                if name == "touched":
+                    modes = bundle["modal/basis"][:] @ run["reduced"][:].T + bundle["object/vertices"][:][:, :, None]
+                    off = np.linalg.norm(modes.transpose(2, 0, 1) - run["vertices"][:], axis=2).max()
+                    self.assertGreater(off, 1e-3 * SIZE)  # what modes would draw
+        self.assertIn("expected at most", self.refused("touched_run.h5", "-o", "a.glb", "--targets", "22"))
+        pair = {"time_step": 0.01, "steps": 60, "gravity": [0, 0, -9.81], "output": {"trajectory": "pair_run.h5", "every": 5}, "bodies": [
+            {"name": "a", "bundle": "touched.h5", "space": "full"}, {"name": "b", "bundle": "touched.h5", "body": {"motion": [{"time": 0, "position": [0, 5, 0]}]}}]}
+        write_json(self.folder / "pair.json", pair)
+        self.call(RUNTIME, "run", "pair.json")
+        self.export("pair_run.h5", "-o", "motion.glb", "--mesh")
+        with h5py.File(self.folder / "pair_run.h5") as run:
+            for drawn, name in zip(self.frames_of_bodies("motion.glb", run["bodies/a/time"][:]), "ab"):
+                self.check_drawn(drawn, run[f"bodies/{name}/vertices"][:])
+
+    def test_a_skin_moves_by_its_bones_and_the_flesh_on_top(self):
+        write_skinned(self.folder / "skinned.glb", bulge=0.4)
+        asset = {"name": "skinned", "object": {"surface": "skinned.glb", "cells": 500, "render_mesh": "skinned.glb",
+                                               "material": {"youngs_modulus": 2e6, "poisson_ratio": 0.4, "density": 1000}},
+                 "basis": {"size": 8, "linear_modes": 6, "training": "none"}, "cubature": {"elements": 20}, "needs": ["render"]}
+        write_json(self.folder / "skinned.json", asset)
+        self.call(PRECOMPUTE, "bundle", "skinned.json", "-o", "skinned.h5")
+        self.run_scene("skinned", {"gravity": [0, -9.81, 0], "time_step": 0.005, "damping": {"stiffness": 0.005},
+                                   "body": {"animation": {"name": "curl", "start": 0.1}}})
+        for words in ([], ["--up", "z"]):
+            printed = self.export("skinned_run.h5", "-o", "motion.glb", *words)
+            self.assertRegex(printed, r"skin +3 bones")
+            run = self.trajectory("skinned")
+            drawn = self.frames("motion.glb", run["time"])
+            if words:
+                drawn = np.stack([drawn[:, :, 0], -drawn[:, :, 2], drawn[:, :, 1]], 2)
+            self.assertLess(np.linalg.norm(drawn - run["render/vertices"], axis=2).max(), 1e-5 * np.linalg.norm([3, 1, 1]))
+        document, arrays = contents(self.folder / "motion.glb")
+        names = [node.get("name") for node in document["nodes"]]
+        (skin,) = document["skins"]
+        self.assertEqual([names[joint] for joint in skin["joints"]], ["root", "middle", "tip"])
+        self.assertEqual([names[child] for child in document["nodes"][names.index("middle")]["children"]], ["tip"])
+        # The bones turn as their animation says, and the flesh does beside: what the bones alone would draw is elsewhere.
+        channels = {(names[c["target"]["node"]], c["target"]["path"]): document["animations"][0]["samplers"][c["sampler"]]
+                    for c in document["animations"][0]["channels"]}
+        times = arrays[channels["tip", "rotation"]["input"]].ravel()
+        angle = np.radians(60) * np.minimum(times + 0.1, 1 - (times + 0.1))  # 30 degrees in half a second and back
+        expected = np.stack([0 * angle, 0 * angle, np.sin(angle / 2), np.cos(angle / 2)], 1)
+        np.testing.assert_allclose(arrays[channels["tip", "rotation"]["output"]], expected, atol=1e-6)
+        primitive = document["meshes"][0]["primitives"][0]
+        weights = arrays[primitive["attributes"]["WEIGHTS_0"]]
+        np.testing.assert_allclose(weights.sum(1), 1, atol=1e-7)
+        flesh = np.array([np.abs(arrays[target["POSITION"]]).max() for target in primitive["targets"]])
+        self.assertGreater(flesh.max(), 0.01)
+        self.assertLess(flesh.max(), 0.3)  # a limb goes 1.6 m
 
     def test_fewer_targets_miss_what_is_said(self):
         for name, fewer in itertools.product(("clamped", "free"), (1, 3)):

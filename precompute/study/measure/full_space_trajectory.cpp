@@ -36,7 +36,7 @@ SymbolSizes sizes_of(const ReducedModel& data, std::int64_t frames) {
 }
 
 Hdf5File create_file(const AtomicFile& output, const SceneConfig& config, const ReducedModel& data,
-                     const SymbolSizes& sizes, const std::vector<runtime::WeightInfo>& forces) {
+                     const SymbolSizes& sizes, const std::vector<runtime::WeightInfo>& forces, std::int64_t frames) {
   Hdf5File file = Hdf5File::create(output.temporary(), output.target().string());
   write_header(file, trajectory_schema(), generator_name());
   file.write_attribute("/", "asset_name", data.asset_name);
@@ -44,6 +44,7 @@ Hdf5File create_file(const AtomicFile& output, const SceneConfig& config, const 
   file.write_attribute("/", "bundle", std::string());
   file.write_attribute("/", "integrator", std::string(name_of(config.integrator)));
   file.write_attribute("/", "time_step", config.time_step);
+  file.write_attribute("/", "full_frames", frames);
   runtime::write_body_groups(file, "", sizes, forces);
   return file;
 }
@@ -56,7 +57,7 @@ FullSpaceTrajectory::FullSpaceTrajectory(const std::filesystem::path& file, cons
       body_(body),
       output_(file),
       weights_(acting(config, body)),
-      file_(create_file(output_, config, data, sizes_of(data, frames), weights_)),
+      file_(create_file(output_, config, data, sizes_of(data, frames), weights_, frames)),
       mass_(scalar_mass(data.object->mesh, data.object->materials.density)) {
   const SymbolSizes sizes = sizes_of(data, frames);
   const DatasetSchema& tets = trajectory_schema().dataset("/tets");

@@ -219,6 +219,11 @@ RenderData small_render() {
   render.look = FlagVector{{103, 108, 84, 70}};
   render.look_vertices = IndexVector{{1, 0}};
   render.look_frames = RowMatrix::Identity(6, 3);
+  render.bones = IndexMatrix::Zero(3, 2);
+  render.bones(1, 1) = 1;
+  render.bone_weights = RowMatrix::Zero(3, 2);
+  render.bone_weights.col(0) << 1, 0.25, 1;
+  render.bone_weights(1, 1) = 0.75;
   return render;
 }
 

@@ -76,9 +76,14 @@ TEST_F(FullSpaceFile, IsAsTheSchemaSays) {
   sizes.set("K", 3, "the bar");
   sizes.set("F", 6, "the scene");
   EXPECT_FALSE(opened.has_group("/bodies")) << "it has one body, at the root";
-  const std::set<std::string> none{"/reduced",           "/reduced_velocity",   "/regions/{region}/weights",
-                                   "/attachments/force", "/attachments/torque", "/render/triangles",
-                                   "/render/vertices"};
+  const std::set<std::string> none{"/reduced",
+                                   "/reduced_velocity",
+                                   "/regions/{region}/weights",
+                                   "/attachments/force",
+                                   "/attachments/torque",
+                                   "/render/triangles",
+                                   "/render/vertices",
+                                   "/bones"};
   for (const DatasetSchema& schema : trajectory_schema().datasets) {
     ASSERT_EQ(opened.has_dataset(schema.path), !none.contains(schema.path)) << schema.path;
     if (none.contains(schema.path)) continue;
