@@ -9,13 +9,17 @@
 #include <limits>
 #include <mutex>
 #include <new>
-#include <pthread.h>
-#include <sched.h>
 #include <thread>
 #include <vector>
 
 #if defined(__x86_64__)
 #include <immintrin.h>
+#endif
+#ifdef __linux__
+#include <sched.h>
+#endif
+#ifndef _WIN32
+#include <pthread.h>
 #endif
 
 namespace exmat {
@@ -144,11 +148,13 @@ class Teams {
 
  private:
   Teams() {
+#ifndef _WIN32  // which has no fork()
     pthread_atfork([] { all().mutex_.lock(); }, [] { all().mutex_.unlock(); },
                    [] {
                      all().free_.clear();
                      all().mutex_.unlock();
                    });
+#endif
   }
 
   std::mutex mutex_;
@@ -187,9 +193,11 @@ void run_shared(const SharedLoop& loop) noexcept {
 }
 
 int processor_count() noexcept {
+#ifdef __linux__
   cpu_set_t allowed;
-  if (sched_getaffinity(0, sizeof allowed, &allowed) != 0) return std::max(1U, std::thread::hardware_concurrency());
-  return std::max(1, CPU_COUNT(&allowed));
+  if (sched_getaffinity(0, sizeof allowed, &allowed) == 0) return std::max(1, CPU_COUNT(&allowed));
+#endif
+  return static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
 }
 
 }  // namespace exmat

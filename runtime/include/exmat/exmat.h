@@ -25,7 +25,9 @@
 
 /* NOLINTBEGIN(readability-identifier-naming): names of a C library */
 
-#if defined(__GNUC__)
+#if defined(_WIN32) && defined(exmat_runtime_EXPORTS) /* CMake defines it where it makes the DLL */
+#define EXMAT_API __declspec(dllexport)
+#elif defined(__GNUC__) && !defined(_WIN32)
 #define EXMAT_API __attribute__((visibility("default")))
 #else
 #define EXMAT_API
