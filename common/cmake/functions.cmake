@@ -82,15 +82,19 @@ endfunction()
 
 # exmat_kernel_options(NAME FOLDER): how the kernels in FOLDER, which are the sources of NAME, are compiled.
 function(exmat_kernel_options name folder)
+  if(NOT EXMAT_PORTABLE)
+    target_compile_options(${name} PRIVATE -ffp-contract=fast)
+  endif()
   # Square roots of negative numbers need not be told to errno: that would keep them out of the wide registers.
-  target_compile_options(${name} PRIVATE -ffp-contract=fast -fno-math-errno)
+  target_compile_options(${name} PRIVATE -fno-math-errno)
   # Registers of four doubles are passed to inlined functions alone.
   target_compile_options(${name} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-Wno-psabi>)
   # A loop over elements is one function after inlining: what is left out goes through memory, register by register.
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     target_compile_options(${name} PRIVATE --param=large-function-growth=10000 --param=inline-unit-growth=1000)
   endif()
-  if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  # On Windows GCC does not align the registers of AVX that it spills (bug 54412).
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64" AND NOT EXMAT_PORTABLE AND NOT (WIN32 AND CMAKE_CXX_COMPILER_ID STREQUAL GNU))
     target_compile_definitions(${name} PRIVATE EXMAT_X86_KERNELS)
     set_source_files_properties(${folder}/kernels_avx2.cpp PROPERTIES COMPILE_OPTIONS "-mavx2;-mfma")
     set_source_files_properties(${folder}/kernels_avx512.cpp PROPERTIES

@@ -1,4 +1,4 @@
-// State hashes of a pack as a native build has them, to be compared with those in WebAssembly (hash.test.mjs):
+// State hashes of a pack, to be compared with those of other systems (run) and of tests/web/hash.test.mjs:
 //   exmat-pack-hash PACK EVERY TIMES [MEMBER=VALUE...] [floor=Z]
 // prints the hash after EVERY, 2 EVERY, ... steps. Members are numbers of exmat_settings.
 #include <cinttypes>
