@@ -83,10 +83,6 @@ struct Drawn {
       : surface(model), triangles(surface.triangles()), xyz(3 * surface.points()) {}
 
   void update(exmat::BodyRef body) { body.read_positions(surface, xyz); }  // then upload xyz
-  Vector point(std::int32_t k) const {
-    const auto at = 3 * static_cast<std::size_t>(k);
-    return {xyz[at], xyz[at + 1], xyz[at + 2]};
-  }
 
   exmat::Surface surface;
   std::vector<std::int32_t> triangles;  // [3f], constant
@@ -114,33 +110,11 @@ class Between {
 };
 
 // recipe: picking
-struct Picked {
-  std::int64_t triangle = -1;
-  std::array<double, 3> shares{};  // of its corners
-  double distance = INFINITY;
-};
-
-/// The nearest triangle that a ray from `eye` along `direction` meets (Moeller and Trumbore 1997).
-std::optional<Picked> pick(const Drawn& drawn, const Vector& eye, const Vector& direction) {
-  Picked nearest;
-  for (std::size_t f = 0; f < drawn.triangles.size() / 3; ++f) {
-    const Vector a = drawn.point(drawn.triangles[3 * f]);
-    const Vector ab = drawn.point(drawn.triangles[3 * f + 1]) - a, ac = drawn.point(drawn.triangles[3 * f + 2]) - a;
-    const Vector p = cross(direction, ac), s = eye - a, q = cross(s, ab);
-    const double determinant = dot(ab, p);
-    const double u = dot(s, p) / determinant, v = dot(direction, q) / determinant, t = dot(ac, q) / determinant;
-    if (determinant == 0 || u < 0 || v < 0 || u + v > 1 || t < 0 || t >= nearest.distance) continue;
-    nearest = {static_cast<std::int64_t>(f), {1 - u - v, u, v}, t};
-  }
-  if (nearest.triangle < 0) return std::nullopt;
-  return nearest;
-}
-
 /// A spring from the picked point to the mouse, renewed before each step.
 class Hand {
  public:
-  Hand(const Drawn& drawn, const Picked& picked)
-      : points_(exmat::Points::on_surface(drawn.surface, std::array{picked.triangle}, picked.shares)) {}
+  Hand(const exmat::Surface& surface, const exmat::RayHit& picked)
+      : points_(exmat::Points::on_surface(surface, std::array{picked.triangle}, picked.shares)) {}
 
   void pull(exmat::BodyRef body, const Vector& mouse) {
     std::array<float, 3> xyz;
@@ -334,12 +308,13 @@ int main(int argc, char** argv) {
     const std::uint64_t saved = world.hash();
 
     const Vector eye{3.8, 0.5, 10}, down{0, 0, -1};
-    const std::optional<Picked> picked = pick(drawn, eye, down);
+    const std::optional<exmat::RayHit> picked = world.body(upper).cast_ray(drawn.surface, eye, down);
     if (!picked) throw exmat::Error(EXMAT_FAILURE, "the ray meets nothing");
-    Hand hand(drawn, *picked);
+    Hand hand(drawn.surface, *picked);
     const Vector mouse{3.8, 0.5, 10 - picked->distance + 0.5};
     frames(30, [&] { hand.pull(world.body(upper), mouse); });
-    const double before = picked->distance, after = pick(drawn, eye, down).value_or(*picked).distance;
+    const double before = picked->distance,
+                 after = world.body(upper).cast_ray(drawn.surface, eye, down).value_or(*picked).distance;
     std::printf("pulled       the picked point up by %.2f m\n", before - after);
     world.body(upper).clear_forces();
 

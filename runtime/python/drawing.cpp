@@ -1,3 +1,4 @@
+#include <limits>
 #include <pybind11/stl.h>
 
 #include "runtime/python/objects.h"
@@ -29,6 +30,15 @@ py::array_t<float> energy_density(BodyObject& body, SurfaceObject& surface) {
   py::array_t<float> density(static_cast<py::ssize_t>(surface.count));
   body.get().read_energy_density(surface.surface, span_of(density));
   return density;
+}
+
+std::optional<RayHit> cast_ray(BodyObject& body, const SurfaceObject& surface, const Numbers& origin,
+                               const Numbers& direction, double within) {
+  require_shape(origin, "origin", {3});
+  require_shape(direction, "direction", {3});
+  const auto hit =
+      body.get().cast_ray(surface.surface, read_span(origin).first<3>(), read_span(direction).first<3>(), within);
+  return hit;
 }
 
 py::array_t<double> placement(BodyObject& body) {
@@ -142,8 +152,21 @@ void bind_capacity(py::module_& module) {
 
 }  // namespace
 
+void bind_ray_hit(py::module_& module) {
+  const auto array = [](const std::array<double, 3>& numbers) { return py::array_t<double>(3, numbers.data()); };
+  py::class_<RayHit>(module, "RayHit", "A point of a surface that a ray meets.")
+      .def_readonly("triangle", &RayHit::triangle)
+      .def_property_readonly(
+          "shares", [array](const RayHit& hit) { return array(hit.shares); },
+          "Those of the triangle's corners, shape (3,), sum 1, as Surface.points() takes them.")
+      .def_readonly("distance", &RayHit::distance, "[m]")
+      .def_property_readonly(
+          "normal", [array](const RayHit& hit) { return array(hit.normal); }, "Outward, of length 1: shape (3,).");
+}
+
 void bind_drawing(py::module_& module, BodyClass& body, WorldClass& world, BatchClass& batch) {
   bind_surface(module);
+  bind_ray_hit(module);
   bind_capacity(module);
   bind_profile(body);
   bind_profile(world);
@@ -152,6 +175,11 @@ void bind_drawing(py::module_& module, BodyClass& body, WorldClass& world, Batch
            "Those of the k points of a surface, likewise.")
       .def("energy_density", &energy_density, py::arg("surface"),
            "Elastic energy per volume at rest at the points of a surface, shape (k,), float32 [J/m^3].")
+      .def("cast_ray", &cast_ray, py::arg("surface"), py::arg("origin"), py::arg("direction"),
+           py::arg("within") = std::numeric_limits<double>::infinity(),
+           "The first triangle of a surface, as it is now, that a ray from `origin` [m] along `direction` meets within "
+           "so "
+           "many metres, from either side, None where it meets nothing.")
       .def_property_readonly("placement", &placement,
                              "The rotation R and the shift t of x = R (X + U q) + t, side by side: shape (3, 4).")
       .def("target", &target, py::arg("region") = py::none(),

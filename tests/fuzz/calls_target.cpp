@@ -657,6 +657,10 @@ class Calls {
         exmat_surface* const surface = choices_.of(surfaces_);
         const std::int64_t count = std::max<std::int64_t>(exmat_points_count(exmat_surface_points(surface)), 0);
         checked(exmat_body_read_energy_density(one, surface, floats.data(), fits(count)));
+        std::int64_t hit = 0;
+        const std::vector<double> ray = choices_.numbers(7);
+        checked(exmat_body_cast_ray(one, surface, ray.data(), ray.data() + 3, ray[6], &hit, numbers.data(),
+                                    numbers.data() + 3, numbers.data() + 4));
         std::array<std::int32_t, 4096> triangles{};
         checked(exmat_surface_read_triangles(surface, triangles.data(),
                                              fits(std::max<std::int64_t>(3 * exmat_surface_triangles(surface), 0))));

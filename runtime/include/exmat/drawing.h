@@ -60,6 +60,14 @@ EXMAT_API exmat_status exmat_points_create_on_surface(const exmat_surface* surfa
                                                       const double* shares, int64_t count,
                                                       exmat_points** points) EXMAT_NOEXCEPT;
 
+/* The first triangle of the surface of a body, as it is now, that a ray from `origin` [3] [m] along `direction` [3], of
+   any length but 0, meets within `most` [m], from either side: its number, -1 where there is none; the `shares` [3] of
+   its corners, as exmat_points_create_on_surface() takes them; the `distance` from the origin [m]; and the unit
+   `normal` [3], outward. All but `triangle` may be NULL. It takes the time of exmat_body_read_positions_double(). */
+EXMAT_API exmat_status exmat_body_cast_ray(const exmat_body* body, const exmat_surface* surface, const double* origin,
+                                           const double* direction, double most, int64_t* triangle, double* shares,
+                                           double* distance, double* normal) EXMAT_NOEXCEPT;
+
 /* The places of the s cubature elements, of tets their centroids and of rings their vertices, and how many each stands
    for: `weights` [count = s], or NULL. */
 EXMAT_API int64_t exmat_model_elements(const exmat_model* model) EXMAT_NOEXCEPT; /* s */

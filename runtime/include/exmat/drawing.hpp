@@ -88,6 +88,14 @@ inline void BodyRef::read_positions(const Surface& surface, std::span<double> xy
   check(exmat_body_read_positions_double(get(), surface.handle(), xyz.data(), detail::length(xyz)));
 }
 
+inline std::optional<RayHit> BodyRef::cast_ray(const Surface& surface, std::span<const double, 3> origin,
+                                               std::span<const double, 3> direction, double most) const {
+  RayHit hit;
+  check(exmat_body_cast_ray(get(), surface.get(), origin.data(), direction.data(), most, &hit.triangle,
+                            hit.shares.data(), &hit.distance, hit.normal.data()));
+  return hit.triangle < 0 ? std::nullopt : std::optional(hit);
+}
+
 inline Elasticity Model::elasticity(std::span<const double> q) const {
   Elasticity at{0, std::vector<double>(q.size()), std::vector<double>(q.size() * q.size())};
   check(

@@ -6,7 +6,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -94,6 +96,14 @@ inline exmat_obstacle default_obstacle() {
 struct Elasticity {
   double energy = 0;
   std::vector<double> force, tangent;
+};
+
+/// A point of a surface that a ray meets.
+struct RayHit {
+  std::int64_t triangle = -1;
+  std::array<double, 3> shares{};  ///< of its corners, sum 1, as Points::on_surface() takes them
+  double distance = 0;             ///< [m]
+  std::array<double, 3> normal{};  ///< outward, of length 1
 };
 
 /// A square sparse matrix: row i has the entries from starts[i] to starts[i + 1], their columns ascending.
@@ -363,6 +373,10 @@ class BodyRef {
   void read_placement(std::span<double, 12> placement) const {
     check(exmat_body_read_placement(get(), placement.data()));
   }
+  /// The first triangle that a ray from `origin` [m] along `direction` meets within `most` [m], from either side.
+  std::optional<RayHit> cast_ray(const Surface& surface, std::span<const double, 3> origin,
+                                 std::span<const double, 3> direction,
+                                 double most = std::numeric_limits<double>::infinity()) const;
   /// `density` [k] [J/m^3].
   void read_energy_density(Surface& surface, std::span<float> density) const;
   /// `q` [r].

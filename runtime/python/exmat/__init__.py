@@ -17,7 +17,7 @@ import copyreg
 from typing import Any
 
 from . import _exmat, precompute
-from ._exmat import (Batch, Body, Capacity, ContactLaw, Energies, Motion, Obstacle, Points, Report, Shape, State, Surface, WorldReport,
+from ._exmat import (Batch, Body, Capacity, ContactLaw, Energies, Motion, Obstacle, Points, RayHit, Report, Shape, State, Surface, WorldReport,
                      WorldState, state_hash)
 from ._exmat import version as __version__
 from .errors import BadInput, Cancelled, Error, Failure, InvalidArgument, NonFinite
@@ -38,5 +38,5 @@ for _class in [value for value in vars(_exmat).values() if isinstance(value, typ
     _class.__reduce__ = _reduce  # type: ignore[assignment]
 
 __all__ = ["BadInput", "Batch", "Body", "Bundle", "Cancelled", "Capacity", "ContactLaw", "Energies", "Error", "Failure", "Field", "InvalidArgument", "Model",
-           "Motion", "NonFinite", "Obstacle", "Points", "Report", "Shape", "State", "Surface", "Trajectory", "World", "WorldReport",
+           "Motion", "NonFinite", "Obstacle", "Points", "RayHit", "Report", "Shape", "State", "Surface", "Trajectory", "World", "WorldReport",
            "WorldState", "precompute", "state_hash"]

@@ -72,18 +72,24 @@ std::vector<std::string> names_of(const BodyShape& shape, const std::string& reg
   return names;
 }
 
-void draw_weights(ForceSettings& force, const std::vector<std::string>& names) {
+/// `now`: the weights of the last step, which keys of the scene have brought about until a slider is moved.
+void draw_weights(ForceSettings& force, const std::vector<std::string>& names, const std::vector<double>& now) {
   label("weights", "Given: the body goes to this blend. Else they are those of its shape.");
-  ImGui::Checkbox("given##weights", &force.given);
+  if (ImGui::Checkbox("given##weights", &force.given)) force.keyed = false;
   if (!force.given) return;
-  for (std::size_t i = 0; i < force.weights.size() && i < names.size(); ++i) {
+  std::vector<double> weights = force.keyed ? now : force.weights;
+  for (std::size_t i = 0; i < weights.size() && i < names.size(); ++i) {
     ImGui::PushID(static_cast<int>(i));
-    if (share(names[i].c_str(), nullptr, force.weights[i]) && force.weights.size() > 1) balance(force.weights, i);
+    if (share(names[i].c_str(), nullptr, weights[i])) {
+      if (weights.size() > 1) balance(weights, i);
+      force.keyed = false;
+    }
     ImGui::PopID();
   }
+  if (!force.keyed) force.weights = std::move(weights);
 }
 
-void draw_force(ForceSettings& force, const std::vector<std::string>& names) {
+void draw_force(ForceSettings& force, const std::vector<std::string>& names, const std::vector<double>& now) {
   const bool elastic = force.law == "elastic";
   const std::string title = force.region.empty() ? "whole body" : force.region;
   ImGui::Checkbox(title.c_str(), &force.on);
@@ -95,7 +101,7 @@ void draw_force(ForceSettings& force, const std::vector<std::string>& names) {
   share("bias", "Factor on the weight of the rest pose: 1 changes nothing, 0 leaves it out", force.bias);
   choice("target", "table: from the bundle; solve: by Newton's method", force.target,
          std::array<const char*, 3>{"auto", "table", "solve"});
-  draw_weights(force, names);
+  draw_weights(force, names, now);
 }
 
 }  // namespace
@@ -112,7 +118,7 @@ void Controls::draw(const Style& style, const Snapshot& snapshot, Studio& studio
   draw_kind(studio);
   Settings settings = studio.settings(kind_);
   if (!settings.forces.empty() && ImGui::CollapsingHeader("Examples", ImGuiTreeNodeFlags_DefaultOpen))
-    draw_examples(settings, studio);
+    draw_examples(settings, snapshot, studio);
   if (ImGui::CollapsingHeader("View", ImGuiTreeNodeFlags_DefaultOpen)) draw_view(studio);
   if (ImGui::CollapsingHeader("Body")) draw_body(settings);
   if (ImGui::CollapsingHeader("World and hands")) draw_world(style, snapshot, settings, studio);
@@ -155,10 +161,12 @@ void Controls::draw_kind(Studio& studio) {
   ImGui::EndCombo();
 }
 
-void Controls::draw_examples(Settings& settings, Studio& studio) {
+void Controls::draw_examples(Settings& settings, const Snapshot& snapshot, Studio& studio) {
+  const auto first = std::ranges::find(studio.kinds_of_bodies(), kind_) - studio.kinds_of_bodies().begin();
+  const auto& weights = snapshot.bodies[static_cast<std::size_t>(first)].weights;
   for (std::size_t i = 0; i < settings.forces.size(); ++i) {
     ImGui::PushID(static_cast<int>(i));
-    draw_force(settings.forces[i], names_of(*studio.shapes()[kind_], settings.forces[i].region));
+    draw_force(settings.forces[i], names_of(*studio.shapes()[kind_], settings.forces[i].region), weights[i]);
     ImGui::PopID();
   }
 }

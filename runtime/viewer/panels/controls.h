@@ -17,7 +17,7 @@ class Controls {
  private:
   void draw_run(const Style& style, const Snapshot& snapshot, Studio& studio);
   void draw_kind(Studio& studio);
-  void draw_examples(Settings& settings, Studio& studio);
+  void draw_examples(Settings& settings, const Snapshot& snapshot, Studio& studio);
   void draw_body(Settings& settings);
   void draw_world(const Style& style, const Snapshot& snapshot, Settings& settings, Studio& studio);
   void draw_view(Studio& studio);

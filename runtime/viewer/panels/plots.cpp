@@ -160,10 +160,11 @@ void draw_lost(const Style& style, const char* what, double lost) {
 }
 
 /// Why bodies step in all vertices.
-std::string full_space_text(const Snapshot& snapshot, std::size_t full) {
+std::string full_space_text(const Snapshot& snapshot, std::size_t full, bool on_bones) {
   const std::string which = snapshot.bodies.size() == 1
                                 ? "The body steps"
                                 : fmt::format("{} of {} bodies step", full, snapshot.bodies.size());
+  if (on_bones) return which + " in all vertices: bones are a load that no basis has learned.";
   return which + (snapshot.grips.empty() ? " in all vertices: something acts that the basis was not made for."
                                          : " in all vertices: the hand is answered without a basis.");
 }
@@ -172,8 +173,9 @@ void draw_basis(const Style& style, const Snapshot& snapshot, const Studio& stud
   const auto full =
       std::ranges::count_if(snapshot.bodies, [](const BodySnapshot& body) { return !body.positions.empty(); });
   if (full > 0) {
+    const bool on_bones = std::ranges::any_of(studio.shapes(), [](const auto& shape) { return shape->on_bones; });
     heading(style, "All vertices");
-    ImGui::TextWrapped("%s", full_space_text(snapshot, static_cast<std::size_t>(full)).c_str());
+    ImGui::TextWrapped("%s", full_space_text(snapshot, static_cast<std::size_t>(full), on_bones).c_str());
   }
   const LostWork& lost = studio.lost_work();
   if (!lost.measured) {

@@ -46,6 +46,7 @@ ForceSettings force_of(const Json& json) {
   force.law = json.value("force", force.law);
   force.given = json.contains("weights");
   if (force.given) force.weights = value_of(json, "weights", force.weights);
+  force.keyed = is_keyed(json, "weights");
   force.on = force.stiffness > 0 || force.damping > 0;
   return force;
 }
@@ -64,7 +65,7 @@ void put_force(Json& json, const ForceSettings& force) {
   put(json, "bias", force.bias, fallback.bias);
   put(json, "target", force.target, fallback.target);
   put(json, "force", force.law, fallback.law);
-  if (is_keyed(json, "weights")) return;
+  if (force.keyed) return;
   json.erase("weights");
   if (!force.given) return;
   json["weights"] = force.weights;
@@ -137,7 +138,9 @@ bool same_model(const Settings& a, const Settings& b) {
   if (a.time_step != b.time_step || a.internal_force != b.internal_force || a.forces.size() != b.forces.size())
     return false;
   for (std::size_t i = 0; i < a.forces.size(); ++i)
-    if (a.forces[i].target != b.forces[i].target || a.forces[i].law != b.forces[i].law) return false;
+    if (a.forces[i].target != b.forces[i].target || a.forces[i].law != b.forces[i].law ||
+        a.forces[i].keyed != b.forces[i].keyed)
+      return false;
   return true;
 }
 

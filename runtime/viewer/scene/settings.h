@@ -16,6 +16,7 @@ struct ForceSettings {
   std::string target = "auto";
   std::string law = "linear";
   bool given = false;           ///< weights are given
+  bool keyed = false;           ///< by the scene's keys: `weights` are those of the first
   std::vector<double> weights;  ///< K; those that are or would be given
 
   bool operator==(const ForceSettings&) const = default;

@@ -194,6 +194,7 @@ void ScriptPlayer::set(const Json& set) {
     take(set, "bias", force->bias);
     take(set, "target", force->target);
     if (set.contains("weights")) {
+      force->keyed = false;
       force->given = !set["weights"].empty();
       if (force->given) force->weights = set["weights"].get<std::vector<double>>();
     }

@@ -51,6 +51,7 @@ BodyShape make_shape(const Model& model, const Surface& surface) {
   for (std::size_t i = 0; i + 2 < shape.rest.size(); i += 3)
     shape.bounds.add(Eigen::Map<const Eigen::Vector3d>(shape.rest.data() + i));
   shape.mass = mass_of(model);
+  shape.on_bones = model.bones() > 0;
   return shape;
 }
 

@@ -26,8 +26,9 @@ struct BodyShape {
   bool render_mesh = false;
   std::vector<float> element_sizes;  ///< s, of the cubature: cube roots of weights, the largest 1
   std::vector<ShownExample> examples;
-  Bounds bounds;    ///< at rest
-  double mass = 0;  ///< mass of a free body [kg]; 0 with fixed vertices
+  Bounds bounds;          ///< at rest
+  bool on_bones = false;  ///< it hangs on a skeleton
+  double mass = 0;        ///< mass of a free body [kg]; 0 with fixed vertices
 };
 
 /// Shape of a model's bodies, from its surface.

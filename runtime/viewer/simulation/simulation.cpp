@@ -219,6 +219,7 @@ void Simulation::rebuild(std::size_t kind, const Settings& settings) {
     obstacles_[i].moved = true;
   }
   for (std::size_t i = 0; goes_on && i < bodies_.size(); ++i) {
+    if (kinds_[slots_[i].kind].shape->on_bones) continue;
     bodies_[i].set_reduced(motions[i].q, motions[i].v);
     if (kinds_[slots_[i].kind].shape->mass > 0) bodies_[i].set_motion(motions[i].motion);
   }

@@ -312,6 +312,49 @@ TEST_F(Drawing, ForceAndTangentAreDerivativesOfTheEnergy) {
   EXPECT_THROW(model.elasticity(std::vector<double>(r, NAN)), exmat::Error);
 }
 
+TEST_F(Drawing, ARayMeetsTheNearestOfAllTriangles) {
+  const exmat::Model model = make();
+  exmat::Body body(model);
+  put(body, some_pose());
+  const exmat::Surface surface(model);
+  const std::vector<std::int32_t> triangles = surface.triangles();
+  std::vector<double> xyz(3 * surface.points());
+  body.read_positions(surface, xyz);
+  const auto point = [&](std::size_t k) -> Eigen::Vector3d { return Eigen::Map<Eigen::Vector3d>(&xyz[3 * k]); };
+  const auto corner = [&](std::size_t f, std::size_t c) {
+    return point(static_cast<std::size_t>(triangles[3 * f + c]));
+  };
+  const Eigen::Vector3d middle = Eigen::Map<Eigen::Matrix3Xd>(xyz.data(), 3, surface.points()).rowwise().mean();
+  int hits = 0;
+  for (int i = 0; i < 200; ++i) {
+    const Eigen::Vector3d origin = middle + 9 * Eigen::Vector3d(std::sin(i), std::cos(3 * i), std::sin(7 * i + 1.0));
+    const Eigen::Vector3d direction =
+        middle + 0.4 * Eigen::Vector3d(std::cos(5 * i), std::sin(2 * i), std::sin(i)) - origin;
+    double nearest = INFINITY;
+    for (std::size_t f = 0; f < triangles.size() / 3; ++f) {
+      Eigen::Matrix3d sides;
+      sides << corner(f, 1) - corner(f, 0), corner(f, 2) - corner(f, 0), -direction.normalized();
+      const Eigen::Vector3d at = sides.fullPivLu().solve(origin - corner(f, 0));
+      if (at[0] >= 0 && at[1] >= 0 && at[0] + at[1] <= 1 && at[2] >= 0) nearest = std::min(nearest, at[2]);
+    }
+    const std::array from{origin[0], origin[1], origin[2]}, along{direction[0], direction[1], direction[2]};
+    const std::optional<exmat::RayHit> hit = body.cast_ray(surface, from, along);
+    ASSERT_EQ(hit.has_value(), std::isfinite(nearest)) << i;
+    if (!hit) continue;
+    ++hits;
+    EXPECT_NEAR(hit->distance, nearest, 1e-12 * nearest) << i;
+    Eigen::Vector3d place = Eigen::Vector3d::Zero();
+    for (std::size_t c = 0; c < 3; ++c) place += hit->shares[c] * corner(static_cast<std::size_t>(hit->triangle), c);
+    EXPECT_LE((place - origin - nearest * direction.normalized()).norm(), 1e-12 * nearest) << i;
+    EXPECT_FALSE(body.cast_ray(surface, from, along, 0.999 * nearest)) << i;
+  }
+  EXPECT_GT(hits, 50);
+  EXPECT_LT(hits, 200);
+  const std::array zero{0.0, 0.0, 0.0};
+  EXPECT_THROW(body.cast_ray(surface, zero, zero), exmat::Error);
+  EXPECT_THROW(body.cast_ray(exmat::Surface(make()), zero, std::array{0.0, 0.0, 1.0}), exmat::Error);
+}
+
 TEST_F(Drawing, MatricesAreThoseOfTheMesh) {
   const exmat::Model model = make();
   const ObjectData& object = *bar_.model.object;

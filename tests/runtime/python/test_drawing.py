@@ -164,6 +164,21 @@ def test_energy_density_is_quadratic_near_rest(model, body, surface):
     assert whole.min() > 0
 
 
+def test_a_ray_meets_the_body_where_it_is(model, body, surface):
+    pose = 0.3 * np.sin(1 + np.arange(model.modes))
+    body.set_reduced(pose, 0 * pose)
+    middle = body.positions(surface).mean(0).astype(float)
+    hit = body.cast_ray(surface, middle + [0, 0, 10], [0, 0, -3])
+    place = body.positions(surface.points([hit.triangle], [hit.shares]), np.empty((1, 3)))[0]
+    np.testing.assert_allclose(place, middle + [0, 0, 10 - hit.distance], atol=1e-12)
+    assert hit.normal[2] > 0 and np.linalg.norm(hit.normal) == pytest.approx(1)
+    assert body.cast_ray(surface, middle, [0, 0, 1]).normal[2] > 0  # from inside
+    assert body.cast_ray(surface, middle + [0, 0, 10], [0, 0, -3], within=5) is None
+    for origin, direction in (([0, 0, np.nan], [0, 0, 1]), ([0, 0, 0], [0, 0, 0])):
+        with pytest.raises(exmat.InvalidArgument, match="direction"):
+            body.cast_ray(surface, origin, direction)
+
+
 def test_elements_lie_in_the_object_and_have_weights(model):
     points = exmat.Points.elements(model)
     rest = exmat.Surface(model).rest

@@ -72,6 +72,27 @@ TEST_F(Simulations, WithWhatWasSetAreThoseOfTheSceneThatIsSaved) {
   EXPECT_NE(simulation.hash(), hash_of(folder_ / "scene.json", 2, 150));
 }
 
+TEST_F(Simulations, KeysOfTheSceneGoOnWhileSomethingElseIsTurned) {
+  Simulation simulation =
+      make(R"({"bundle": "bar.h5", "gravity": [0, 0, -1], "examples": {"stiffness": 50, "damping": 1,
+    "weights": {"keys": [{"time": 0, "value": [1, 0, 0]}, {"time": 0.1, "value": [0, 1, 0]}]}}})");
+  Settings settings = simulation.settings(0);
+  EXPECT_TRUE(settings.forces[0].keyed);
+  settings.mass_damping += 0.5;
+  simulation.apply(0, settings);
+  simulation.advance(150);
+  simulation.save_scene(folder_ / "saved.json");
+  EXPECT_EQ(simulation.hash(), hash_of(folder_ / "saved.json", 1, 150));
+  // A slider that is moved takes the weights over, in what is saved, too.
+  settings.forces[0].keyed = false;
+  settings.forces[0].weights = {0.5, 0.25, 0.25};
+  simulation.apply(0, settings);
+  simulation.reset();
+  simulation.advance(150);
+  simulation.save_scene(folder_ / "taken.json");
+  EXPECT_EQ(simulation.hash(), hash_of(folder_ / "taken.json", 1, 150));
+}
+
 TEST_F(Simulations, AreSetBackToTheirStart) {
   Simulation simulation = make();
   simulation.advance(40);
