@@ -341,11 +341,4 @@ std::vector<VertexForceConfig> forces_on_vertices(const SceneConfig& config, Sel
   return forces;
 }
 
-void require_uncompensated(const SceneConfig& scene) {
-  if (!scene.examples || !scene.examples->compensate) return;
-  throw InputError({scene.file.string(), scene.place + "/examples/compensate",
-                    "no such member of a body on bones, or whose clamp follows examples", "true",
-                    "its targets are those of its modes, in which it does not step: leave compensate out"});
-}
-
 }  // namespace exmat

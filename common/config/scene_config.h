@@ -243,9 +243,6 @@ struct SceneConfig {
 /// JSON pointer of the first setting with keys; empty where there is none.
 std::string place_of_keys(const SceneConfig& scene);
 
-/// Throws InputError where the scene, of a body on bones or whose clamp follows examples, has examples.compensate.
-void require_uncompensated(const SceneConfig& scene);
-
 /// Law of contact between bodies; all per area of their surfaces.
 struct BodyContactConfig {
   double stiffness = 1e6;  ///< pressure per depth [N/m^3]

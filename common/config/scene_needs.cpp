@@ -32,6 +32,13 @@ void require_weights(const SceneConfig& scene, const ExampleForceConfig& force, 
                     std::to_string(force.weights->size()), "the first is that of the rest pose"});
 }
 
+void require_uncompensated(const SceneConfig& scene) {
+  if (!scene.examples || !scene.examples->compensate) return;
+  throw InputError({scene.file.string(), scene.place + "/examples/compensate",
+                    "no such member of a body on bones, or whose clamp follows examples", "true",
+                    "its targets are those of its modes, in which it does not step: leave compensate out"});
+}
+
 Needs needs_of(const SceneConfig& scene) {
   Needs needs{.examples = scene.examples || scene.body.pose,
               .carried = !scene.body.motion.empty(),

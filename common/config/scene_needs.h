@@ -22,6 +22,9 @@ void require_bundle(const SceneConfig& scene);
 void require_weights(const SceneConfig& scene, const ExampleForceConfig& force, const std::string& member,
                      Eigen::Index examples);
 
+/// Throws InputError where the scene, of a body on bones or whose clamp follows examples, has examples.compensate.
+void require_uncompensated(const SceneConfig& scene);
+
 /// Needs of a scene from its bundle.
 Needs needs_of(const SceneConfig& scene);
 

@@ -6,6 +6,7 @@
 #include <memory>
 #include <utility>
 
+#include "common/config/scene_needs.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
 #include "common/core/version.h"
