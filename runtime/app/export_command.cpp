@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <map>
 #include <numbers>
+#include <utility>
 
 #include "common/bundle/bundle.h"
 #include "common/core/command_files.h"
@@ -168,7 +169,7 @@ MorphError take_components(Drawing& drawing, std::size_t kind) {
     const BodyMotion& motion = *drawing.bodies[i].motion;
     auto own = all.middleCols(frames, motion.frames());
     if (motion.full)
-      own = drawing.motions[i].displacements;
+      own = std::exchange(drawing.motions[i].displacements, {});
     else
       own = surface.modes * motion.reduced.transpose();
     frames += motion.frames();
