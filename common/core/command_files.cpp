@@ -12,6 +12,8 @@
 namespace exmat {
 namespace {
 
+constexpr const char* kNoRegularFile = "a pipe or a device, no regular file";
+
 /// One file, whatever it is called.
 struct Identity {
   bool exists = false;
@@ -84,7 +86,9 @@ OwnOutputRead::~OwnOutputRead() {
   --registry().own_reads;
 }
 
-void claim_output(const std::filesystem::path& file, const std::string& role) {
+namespace {
+
+void claim(const std::filesystem::path& file, const std::string& role) {
   const std::lock_guard lock(registry().mutex);
   if (registry().commands == 0) return;
   const Identity identity = identity_of(file);
@@ -96,11 +100,22 @@ void claim_output(const std::filesystem::path& file, const std::string& role) {
   registry().outputs.push_back({identity, file, role});
 }
 
+}  // namespace
+
+void claim_output(const std::filesystem::path& file, const std::string& role) {
+  std::error_code ignored;
+  const auto status = std::filesystem::status(file, ignored);
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
+    throw InputError({file.string(), role, "a file, or the name of a new one",
+                      std::filesystem::is_directory(status) ? "a folder" : kNoRegularFile, "choose another name"});
+  claim(file, role);
+}
+
 void claim_folder(const std::filesystem::path& folder, const std::string& role) {
   std::error_code ignored;
   if (std::filesystem::exists(folder, ignored) && !std::filesystem::is_directory(folder, ignored))
     throw InputError({folder.string(), role, "a folder, or the name of a new one", "a file", "choose another name"});
-  claim_output(folder, role);
+  claim(folder, role);
 }
 
 void check_input(const std::filesystem::path& file, const std::string& expected) {
@@ -109,7 +124,7 @@ void check_input(const std::filesystem::path& file, const std::string& expected)
   if (!std::filesystem::exists(status)) throw InputError({file.string(), "", expected, "no such file", ""});
   if (std::filesystem::is_directory(status)) throw InputError({file.string(), "", expected, "a folder", ""});
   if (!std::filesystem::is_regular_file(status))
-    throw InputError({file.string(), "", expected, "a pipe or a device, no regular file", "write it to a file first"});
+    throw InputError({file.string(), "", expected, kNoRegularFile, "write it to a file first"});
   const std::lock_guard lock(registry().mutex);
   if (registry().commands == 0 || registry().own_reads > 0) return;
   const Identity identity = identity_of(file);

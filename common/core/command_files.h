@@ -7,7 +7,7 @@ namespace exmat {
 
 /// The files of one command. While an object lives, no file is both read and written, and no two outputs are one file;
 /// links, hard links and relative spellings count as the file that they lead to. Programs keep one around a command.
-/// Without one, as in a host program, check_input() looks at the file alone and claim_output() does nothing.
+/// Without one, as in a host program, both functions look at the file alone.
 class CommandFiles {
  public:
   CommandFiles();
@@ -17,7 +17,8 @@ class CommandFiles {
 };
 
 /// Announces that the command writes `file`; `role` names it in messages, as "-o". Throws InputError where the command
-/// has read the file, or claims it for another output. Call it before any work.
+/// has read the file, or claims it for another output, and where it is a folder, a pipe or a device. Call it before any
+/// work.
 void claim_output(const std::filesystem::path& file, const std::string& role);
 
 /// The same of a folder that the command fills. Throws InputError also where it is a file.
