@@ -1,8 +1,10 @@
 #include "precompute/app/solver_options.h"
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <map>
+#include <string_view>
 
 #include "common/core/error.h"
 
@@ -52,6 +54,11 @@ void check_solver_options(const precompute::SolverSettings& settings) {
       if (name.find(writes) != std::string::npos)
         throw InputError({"--" + with_dashes(name), "", "an option that writes no file",
                           std::string("one with \"") + writes + "\" in its name", "leave it out"});
+  // Others do not know the inverse that they are given, or work on dense matrices: hours for some thousand vertices.
+  constexpr std::array<std::string_view, 4> kTypes{"krylovschur", "arnoldi", "lanczos", "lobpcg"};
+  for (const auto& [name, value] : settings.options)
+    if (name == "eps_type" && std::ranges::find(kTypes, value) == kTypes.end())
+      throw InputError({"--eps-type", "", "one of krylovschur, arnoldi, lanczos, lobpcg", "'" + value + "'", ""});
 }
 
 void add_solver_options(CLI::App& app, precompute::SolverSettings& settings) {

@@ -10,7 +10,8 @@ namespace exmat {
 /// SLEPc's and PETSc's, with - for _. A word that starts with - and no digit is not a value.
 std::vector<std::pair<std::string, std::string>> take_solver_options(std::vector<char*>& words);
 
-/// Throws InputError where one of the options writes files, which no command has claimed.
+/// Throws InputError where one of the options writes files, which no command has claimed, or names an eigensolver that
+/// does not serve.
 void check_solver_options(const precompute::SolverSettings& settings);
 
 /// Adds --eigensolver; the settings must outlive the program's parsing.

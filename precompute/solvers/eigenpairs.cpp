@@ -191,9 +191,10 @@ Eigen::MatrixXd solve_eigenproblem(const EigenShare& problem, const Eigen::Matri
 }
 
 // SLEPc's search does not end where eigenvalues are far below 1, as of very soft bodies: they are divided by this power
-// of two, which takes no digit. Vectors stay what they are.
-double share_of_mass(const SparseMatrix& stiffness, const SparseMatrix& mass) {
-  const double size = stiffness.diagonal().sum() / mass.diagonal().sum();
+// of two of the size of the smallest, which takes no digit. Vectors stay what they are.
+double share_of_mass(const SparseMatrix& stiffness, const SparseMatrix& mass, const SemidefiniteSolver& solver) {
+  const Eigen::VectorXd smooth = solver.solve(start_vector(solver.size(), 1));
+  const double size = rayleigh_quotient(stiffness, mass, smooth);
   return size < 1 && size > 0 ? std::exp2(std::floor(std::log2(size))) : 1;
 }
 
@@ -203,10 +204,11 @@ class TeamProblem {
   TeamProblem(const SparseMatrix& stiffness, const SparseMatrix& mass, const SemidefiniteSolver& solver)
       : stiffness_(stiffness), mass_(mass), solver_(solver) {
     if (solver.share().mixed) return;
+    const double share = share_of_mass(stiffness, mass, solver);  // with all ranks, before their next call
     const Call call{Task::kPoseEigenproblem, new_share_id(), {solver.share().id}};
     announce(call);
     share_.emplace(call, solver.share());
-    share_->pose(stiffness, share_of_mass(stiffness, mass) * mass);
+    share_->pose(stiffness, share * mass);
   }
 
   // `count` eigenvectors in the M-complement of the columns of `found`.
@@ -218,9 +220,15 @@ class TeamProblem {
     fields.leftCols(found.cols()) = found;
     fields.rightCols(1) = solver_.solve(start_vector(solver_.size(), 1 + static_cast<unsigned>(found.cols())));
     announce({Task::kSearch, share_->id, {found.cols(), count}});
-    Eigen::MatrixXd vectors = share_->search(fields, found.cols(), count);
-    require_options_taken();
-    return vectors;
+    try {
+      Eigen::MatrixXd vectors = share_->search(fields, found.cols(), count);
+      require_options_taken();
+      return vectors;
+    } catch (const WorkError& error) {
+      if (solver_settings().options.empty()) throw;
+      throw InputError({"command line", words_of_options(), "options by which the eigenpairs are found",
+                        std::string("none: ") + error.what(), "mend their values, or leave them out"});
+    }
   }
 
  private:

@@ -228,6 +228,12 @@ void return_freed_memory() {
   mallopt(M_TRIM_THRESHOLD, 2 * kOwnPages);
 }
 
+/// A name of PETSc's database as it stands on a command line.
+std::string word_of(std::string name) {
+  std::replace(name.begin(), name.end(), '_', '-');
+  return "--" + name;
+}
+
 /// PETSc asks for the path of the current folder, and ends the program where there is none.
 void require_current_folder() {
   std::error_code error;
@@ -306,14 +312,19 @@ void configure_solvers(const SolverSettings& wanted) {
 
 const SolverSettings& solver_settings() { return settings(); }
 
+std::string words_of_options() {
+  std::string words;
+  for (const auto& [name, value] : settings().options)
+    words += (words.empty() ? "" : " ") + word_of(name) + (value.empty() ? "" : " " + value);
+  return words;
+}
+
 void require_options_taken() {
   for (const auto& [name, value] : settings().options) {
     PetscBool taken = PETSC_FALSE;
     check_petsc(PetscOptionsUsed(nullptr, name.c_str(), &taken), "options");
     if (taken == PETSC_TRUE) continue;
-    std::string option = "--" + name;
-    std::replace(option.begin(), option.end(), '_', '-');
-    throw InputError({"command line", option, "an option of the solvers in use", "one that none of them takes",
+    throw InputError({"command line", word_of(name), "an option of the solvers in use", "one that none of them takes",
                       "mend its name, or leave it out; --st-ksp-... and --st-pc-... go with --eigensolver gamg or "
                       "lobpcg alone"});
   }

@@ -54,6 +54,8 @@ void forget(std::int64_t id);
 void agree(const std::function<void()>& work);
 
 const SolverSettings& solver_settings();
+/// The options that were given, as on a command line.
+std::string words_of_options();
 /// Throws InputError where an option was given that no solver has taken.
 void require_options_taken();
 

@@ -153,6 +153,22 @@ class Commands(unittest.TestCase):
                       ["study", "study.json", "-o", "bar.veg"], ["study", "--stability", "scene.json", "-o", "scene.json"]):
             self.refused(*words, said=[words[-2], "expected a folder"])
 
+    def test_outputs_are_files(self):
+        """Before any work: runs of as many steps would not end."""
+        write_json(self.folder / "long.json", {"bundle": "bar.h5", "steps": 10 ** 12})
+        os.mkfifo(self.folder / "pipe.h5")
+        for name in ("/dev/null", "pipe.h5", "."):
+            for words in (["run", "long.json", "--dump-state", name], ["run", "long.json", "-o", name], ["pack", "bar.h5", "-o", name],
+                          ["bundle", "asset.json", "-o", "new.h5", "--report", name], ["bundle", "asset.json", "-o", "new.h5", "--depfile", name]):
+                self.refused(*words, said=[words[-2], "a file, or the name of a new one"])
+
+    def test_options_that_no_solver_takes_are_said(self):
+        for option, value in (("--eps-max_it", "0"), ("--eps-tol", "nan"), ("--eps-ncv", "1"), ("--st-type", "foo"), ("--eps-nev", "x")):
+            self.refused("bundle", "asset.json", "-o", "new.h5", option, value,
+                         said=[f"command line: {option.replace('_', '-')} {value}: expected options by which", "mend their values"])
+        for kind in ("lapack", "foo", "ciss"):
+            self.refused("bundle", "asset.json", "-o", "new.h5", "--eps-type", kind, said=["--eps-type: expected one of krylovschur", f"'{kind}'"])
+
     def test_options_of_the_solvers_write_no_files(self):
         for option in ("--eps-view", "--eps-monitor", "--st-ksp-view", "--eps-view-values"):
             self.refused("bundle", "asset.json", "-o", "new.h5", option, "ascii:bar.veg", said=["writes no file", option[2:]])
