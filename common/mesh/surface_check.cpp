@@ -1,10 +1,14 @@
 #include "common/mesh/surface_check.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <tuple>
 #include <utility>
+
+#include "common/mesh/geometry.h"
 
 namespace exmat {
 namespace {
@@ -79,6 +83,18 @@ double enclosed_volume(const VertexArray& vertices, const TriangleArray& triangl
     sum += corner(0).dot(corner(1).cross(corner(2)));
   }
   return sum / 6;
+}
+
+double least_extent(const VertexArray& vertices) {
+  const VertexArray own = vertices.rowwise() - vertices.colwise().mean();
+  const Eigen::Matrix3d moments = own.transpose() * own / static_cast<double>(own.rows());
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(moments, Eigen::EigenvaluesOnly);
+  return std::sqrt(std::max(axes.eigenvalues()[0], 0.0));
+}
+
+bool is_flat(const VertexArray& vertices) {
+  constexpr double kFlat = 1e-6;
+  return least_extent(vertices) <= kFlat * longest_box_edge(vertices);
 }
 
 }  // namespace exmat

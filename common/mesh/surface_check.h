@@ -28,4 +28,10 @@ void weld(const VertexArray& vertices, TriangleArray& triangles);
 /// Volume inside closed triangles that face outward; negative where they face inward [m^3].
 double enclosed_volume(const VertexArray& vertices, const TriangleArray& triangles);
 
+/// Standard deviation of the vertices along the direction in which it is least [m].
+double least_extent(const VertexArray& vertices);
+
+/// True where all vertices lie in a plane, but for a millionth of their extent.
+bool is_flat(const VertexArray& vertices);
+
 }  // namespace exmat

@@ -43,8 +43,10 @@ PoseScale scale_of_pose(double pose_volume, double rest_volume, bool same_mesh) 
   scale.size = ratio;
   const bool own = !differs(ratio, kMostOwnSize - 1);
   if (same_mesh && !own) {
-    scale.objection = volume_text(ratio) +
-                      ", whose own mesh it is: a pose keeps the rest example's unit of length; export both in the same";
+    scale.objection = volume_text(ratio) + ", whose own mesh it is: " +
+                      (unit_near(ratio) > 0 ? "a pose keeps the rest example's unit of length; export both in the same"
+                                            : "a pose keeps about its body's volume; mend what squeezes or swells it, "
+                                              "and export both in the same unit of length");
     return scale;
   }
   if (!own) {

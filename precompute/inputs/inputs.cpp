@@ -25,7 +25,7 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr double kInvertedLimit = 0.05;
+constexpr double kInvertedLimit = 0.05, kMirrored = 0.95;
 // RMS misfit of a pose by a cage, over the diagonal. The poses of docs/surfaces.md are missed by 0.15 % at most.
 constexpr double kMissWarned = 0.02, kMissRefused = 0.1;
 
@@ -207,7 +207,9 @@ class ExampleReader {
 void refuse_inverted(const PoseInput& pose) {
   if (pose.inverted_fraction > kInvertedLimit)
     throw InputError({pose.file.string(), "tets", "a pose that turns less than 5 % of the volume inside out",
-                      fmt::format("{:.1f} %", 100 * pose.inverted_fraction), "mend the pose"});
+                      fmt::format("{:.1f} %", 100 * pose.inverted_fraction),
+                      pose.inverted_fraction > kMirrored ? "it is a mirror image; export it without a negative scale"
+                                                         : "mend the pose"});
   if (pose.inverted_fraction > 0)
     log::warning(
         fmt::format("example {}: {:.2f} % of its volume is inverted", pose.name, 100 * pose.inverted_fraction));
@@ -252,12 +254,17 @@ MeshFile ExampleReader::read_tets(const ExampleConfig& example) {
   return file;
 }
 
-// Warns of a pose that the cage misses, or refuses it.
+// Warns of a pose that no elastic body takes, or that the cage misses; refuses one that it misses by far.
 void ExampleReader::judge_miss(const SurfacePose& fitted, const VertexArray& posed,
                                const ExampleConfig& example) const {
-  if (fitted.rms <= kMissWarned) return;
+  const SurfaceMesh& rest = object_.surface->file().mesh;
+  if (fitted.rms <= kMissWarned) {
+    const std::string fault = fault_of_pose(rest, posed);
+    if (!fault.empty()) log::warning(fmt::format("example {}: {}", example.name, fault));
+    return;
+  }
   const std::string found = fmt::format("{:.1f} % (RMS), {:.1f} % at most", 100 * fitted.rms, 100 * fitted.farthest);
-  const std::string advice = reason_of_miss(object_.surface->file().mesh, posed, fitted);
+  const std::string advice = reason_of_miss(rest, posed, fitted);
   if (fitted.rms > kMissRefused && !asset_.alignment.accept)
     throw InputError({example.file(asset_.object_mesh).string(), "example " + example.name,
                       fmt::format("a pose that the cage follows within {:g} % of its size", 100 * kMissRefused), found,
@@ -300,7 +307,8 @@ void ExampleReader::read_pose(const ExampleConfig& example) {
       throw InputError({path.string(), "vertices", "finite numbers", "NaN or infinity", "export the pose again"});
     require_extent(pose.mesh.vertices, path.string());
     const Eigen::VectorXd volumes = tet_volumes(pose.mesh);
-    pose.inverted_fraction = (-volumes).cwiseMax(0).sum() / volumes.cwiseAbs().sum();
+    const double all = volumes.cwiseAbs().sum();
+    pose.inverted_fraction = all > 0 ? (-volumes).cwiseMax(0).sum() / all : 0;
     refuse_inverted(pose);
   } else {
     const auto checked = check(std::move(file), path, example.drop);

@@ -27,11 +27,27 @@ double median_stretch(const SurfaceMesh& surface, const VertexArray& posed) {
   return *middle;
 }
 
+// A pose may squeeze its body, but leaves it thick.
+constexpr double kSqueezed = 0.01;
+
 double volume_about_centre(const VertexArray& vertices, const TriangleArray& triangles) {
   return enclosed_volume(vertices.rowwise() - vertices.colwise().mean(), triangles);
 }
 
 }  // namespace
+
+std::string fault_of_pose(const SurfaceMesh& surface, const VertexArray& posed) {
+  const double thickness = least_extent(posed) / least_extent(surface.vertices);
+  if (!is_flat(surface.vertices) && thickness < kSqueezed)
+    return fmt::format(
+        "it squeezes the body to {:.2g} times its thickness, as no elastic body can be; mend the pose, or its unit of "
+        "length",
+        thickness);
+  const double volume = volume_about_centre(surface.vertices, surface.triangles);
+  if (volume_about_centre(posed, surface.triangles) / volume < kMirrored)
+    return "it is a mirror image of the object; export it without a negative scale";
+  return "";
+}
 
 std::string reason_of_miss(const SurfaceMesh& surface, const VertexArray& posed, const SurfacePose& pose) {
   const double stretch = median_stretch(surface, posed);
@@ -40,9 +56,7 @@ std::string reason_of_miss(const SurfaceMesh& surface, const VertexArray& posed,
         "its edges are {:.2g} times as long as the object's, so its vertices are in another order; export both from "
         "one mesh",
         stretch);
-  const double volume = volume_about_centre(surface.vertices, surface.triangles);
-  if (volume_about_centre(posed, surface.triangles) / volume < kMirrored)
-    return "it is a mirror image of the object; export it without a negative scale";
+  if (std::string fault = fault_of_pose(surface, posed); !fault.empty()) return fault;
   const Eigen::RowVector3d place = surface.vertices.row(pose.worst);
   return fmt::format(
       "worst at vertex {} at ({:.4g}, {:.4g}, {:.4g}): cells there are larger than what bends, or hold together what "

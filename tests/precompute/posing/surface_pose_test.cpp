@@ -170,6 +170,18 @@ TEST_F(SurfacePoseTest, TheReasonOfAMissIsTold) {
                                                             place[1], place[2])));
 }
 
+TEST_F(SurfacePoseTest, PosesThatNoBodyTakesAreTold) {
+  const auto fault = [&](double x, double y, double z) {
+    return fault_of_pose(surface, surface.vertices * Eigen::RowVector3d(x, y, z).asDiagonal());
+  };
+  EXPECT_THAT(fault(1, -1, 1), testing::HasSubstr("a mirror image"));
+  for (const auto& flat :
+       {std::array{1.0, 1.0, 0.0}, {1.0, 0.0, 0.0}, {0.0, 0.0, 0.0}, {1.0, 1.0, 1e-4}, {1e-3, 1e-3, 1e-3}})
+    EXPECT_THAT(fault(flat[0], flat[1], flat[2]), testing::HasSubstr("times its thickness")) << flat[2];
+  EXPECT_EQ(fault(1, -1, -1), "");
+  EXPECT_EQ(fault(2, 0.5, 0.3), "");
+}
+
 // Positions of a mesh some of whose tets have little left of their volume.
 struct VolumeGuardTest : testing::Test {
   TetMesh mesh = test::box_mesh({3, 2, 2}, {3, 2, 2});
