@@ -68,9 +68,9 @@ SurfaceFile ObjReader::read() {
   if (largest_ >= std::ssize(vertices_))
     fail_at(line_of_largest_, fmt::format("vertices 1 to {}, which the file has", vertices_.size()),
             std::to_string(largest_ + 1));
-  faces_.cut_ears(vertices_, lines_.files().front());
   for (Naming& naming : namings_) name_part(naming, {});
   SurfaceFile surface;
+  surface.warnings = faces_.cut_ears(vertices_, lines_.files().front());
   surface.mesh = {vertex_array(vertices_), triangle_array(faces_.triangles())};
   surface.files = lines_.files();
   parts_.finish(surface, bytes_);

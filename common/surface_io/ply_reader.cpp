@@ -109,8 +109,8 @@ SurfaceFile PlyReader::read() {
                  strips ? "save it with faces, as MeshLab or Blender does" : "");
   }
   check_faces();
-  faces_.cut_ears(vertices_, file_);
   SurfaceFile surface;
+  surface.warnings = faces_.cut_ears(vertices_, file_);
   surface.mesh = {vertex_array(vertices_), triangle_array(faces_.triangles())};
   surface.colours = vertex_array(colours_);
   return surface;

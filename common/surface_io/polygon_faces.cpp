@@ -27,11 +27,16 @@ double area(const Point& a, const Point& b, const Point& c) {
 
 /// The corners in the plane of the face's Newell normal, counterclockwise, about the first and of about unit size.
 std::vector<Point> flattened(const std::vector<Eigen::Vector3d>& corners) {
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero(), largest = normal;
   double size = 0;
   for (const auto& corner : corners) size = std::max(size, (corner - corners[0]).cwiseAbs().maxCoeff());
   const auto local = [&](std::size_t k) -> Eigen::Vector3d { return (corners[k] - corners[0]) / size; };
-  for (std::size_t k = 2; k < corners.size(); ++k) normal += local(k - 1).cross(local(k));
+  for (std::size_t k = 2; k < corners.size(); ++k) {
+    const Eigen::Vector3d area = local(k - 1).cross(local(k));
+    normal += area;
+    if (area.norm() > largest.norm()) largest = area;
+  }
+  if (normal.norm() <= kRounding) normal = largest;  // loops of a face that crosses itself may cancel each other
   const Eigen::Vector3d right = normal.unitOrthogonal(), up = normal.cross(right).normalized();
   std::vector<Point> points;
   for (std::size_t k = 0; k < corners.size(); ++k) points.emplace_back(local(k).dot(right), local(k).dot(up));
@@ -43,6 +48,20 @@ bool fan_serves(const std::vector<Point>& points) {
   for (std::size_t k = 2; k < points.size(); ++k)
     if (area(points[0], points[k - 1], points[k]) <= kRounding) return false;
   return true;
+}
+
+/// True where two edges without a common corner cross.
+bool crosses_itself(const std::vector<Point>& points) {
+  const std::size_t count = points.size();
+  const auto parts = [&](std::size_t edge, std::size_t other) {  // the ends of the other edge
+    const Point &a = points[edge], &b = points[(edge + 1) % count];
+    const double first = area(a, b, points[other]), second = area(a, b, points[(other + 1) % count]);
+    return std::min(first, second) < -kRounding && std::max(first, second) > kRounding;
+  };
+  for (std::size_t edge = 0; edge + 2 < count; ++edge)
+    for (std::size_t other = edge + 2; other < count - (edge == 0 ? 1 : 0); ++other)
+      if (parts(edge, other) && parts(other, edge)) return true;
+  return false;
 }
 
 /// The rest of a polygon while its ears are cut off.
@@ -103,7 +122,10 @@ void PolygonFaces::add(const std::vector<std::int32_t>& polygon) {
     triangles_.push_back({polygon[0], polygon[corner - 1], polygon[corner]});
 }
 
-void PolygonFaces::cut_ears(const std::vector<std::array<double, 3>>& vertices, const std::filesystem::path& file) {
+std::vector<std::string> PolygonFaces::cut_ears(const std::vector<std::array<double, 3>>& vertices,
+                                                const std::filesystem::path& file) {
+  std::size_t crossing = 0;
+  std::vector<std::int32_t> first_crossing;
   std::size_t tests = kTests;
   for (const auto& [first, count] : polygons_) tests += kTestsPerCorner * count;
   for (const auto& [first, count] : polygons_) {
@@ -120,7 +142,15 @@ void PolygonFaces::cut_ears(const std::vector<std::array<double, 3>>& vertices, 
                         "export the mesh triangulated"});
     std::size_t next = first;
     for (const auto& [a, b, c] : cut) triangles_[next++] = {polygon[a], polygon[b], polygon[c]};
+    if (crosses_itself(points) && ++crossing == 1) first_crossing = polygon;
   }
+  if (crossing == 0) return {};
+  std::string corners;
+  for (std::size_t k = 0; k < std::min<std::size_t>(first_crossing.size(), 8); ++k)
+    corners += (k > 0 ? ", " : "") + std::to_string(first_crossing[k]);
+  return {std::to_string(crossing) + (crossing == 1 ? " face whose edges cross is" : " faces whose edges cross are") +
+          " cut into triangles that may not be meant, the first with vertices " + corners +
+          (first_crossing.size() > 8 ? ", ..." : "") + ", from 0; mend the order of its corners"};
 }
 
 }  // namespace exmat

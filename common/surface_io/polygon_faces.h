@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -19,8 +20,9 @@ class PolygonFaces {
 
   /// Faces whose first corner sees all others, as convex ones, stay fans about it. Ears are cut off the others
   /// (Meisters 1975), in the plane of their Newell normal. All corners must be rows of `vertices`. Throws InputError
-  /// if that takes too long, as of thousands of edges that cross.
-  void cut_ears(const std::vector<std::array<double, 3>>& vertices, const std::filesystem::path& file);
+  /// if that takes too long, as of thousands of edges that cross. Returns a warning of faces that cross themselves.
+  std::vector<std::string> cut_ears(const std::vector<std::array<double, 3>>& vertices,
+                                    const std::filesystem::path& file);
 
  private:
   std::vector<std::array<std::int32_t, 3>> triangles_;

@@ -32,6 +32,7 @@ struct SurfaceFile {
   VertexArray colours;                       ///< n x 3 in 0 to 1: red, green, blue; no rows where there are none
   std::vector<std::filesystem::path> files;  ///< every file that was read, the named one first
   std::vector<std::string> remarks;          ///< notes to a user on how the file was read, a sentence each
+  std::vector<std::string> warnings;         ///< likewise, of what is hardly meant
 };
 
 }  // namespace exmat

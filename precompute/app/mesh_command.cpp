@@ -41,7 +41,7 @@ void mesh_command(const MeshCommandOptions& options) {
   if (lower_extension(options.mesh) != ".msh")
     throw InputError({options.mesh, "", "a mesh to write with the extension .msh", "another", ""});
   const SurfaceFile surface = precompute::read_surface_file(options.surface);
-  for (const std::string& remark : surface.remarks) log::info(fmt::format("{}: {}", options.surface, remark));
+  precompute::log_notes(surface, options.surface);
   const precompute::Cage cage = precompute::make_cage(surface.mesh, options.settings, options.surface);
   precompute::write_msh(cage.mesh, options.mesh);
   print_cage(options, surface, cage);

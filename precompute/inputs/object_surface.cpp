@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include "common/core/error.h"
-#include "common/core/log.h"
 
 namespace exmat::precompute {
 namespace {
@@ -38,7 +37,7 @@ SurfaceFile read_recorded_surface(const std::filesystem::path& path, const Asset
     file.skeleton->poses.leftCols<3>() *= asset.length_unit;
   }
   files.insert(files.end(), file.files.begin(), file.files.end());
-  for (const std::string& remark : file.remarks) log::info(fmt::format("{}: {}", path.string(), remark));
+  log_notes(file, path);
   return file;
 }
 

@@ -64,7 +64,7 @@ TetMesh cage_of(const SurfaceMesh& surface, const AssetConfig& asset, const std:
 /// The vertices of a morph target of a surface. Throws InputError that names those that it has.
 const VertexArray& morph_target(const SurfaceFile& surface, const std::string& name, const std::filesystem::path& file);
 
-/// Reads a surface that the asset names, its lengths in metres; adds its files to `files` and logs its remarks.
+/// Reads a surface that the asset names, its lengths in metres; adds its files to `files` and logs its notes.
 SurfaceFile read_recorded_surface(const std::filesystem::path& path, const AssetConfig& asset, InputFiles& files);
 
 }  // namespace exmat::precompute

@@ -102,6 +102,7 @@ class GltfReader {
   std::vector<std::size_t> first_of_node_;
   std::set<int> meshes_;
   std::set<std::string> no_scalars_;
+  std::vector<std::string> flattened_;  // warnings of nodes
   std::size_t nodes_with_meshes_ = 0, left_out_ = 0, rows_ = 0;
 };
 
@@ -136,6 +137,9 @@ void GltfReader::begin_node(int index, const Eigen::Affine3d& to_scene) {
   ++nodes_with_meshes_;
   meshes_.insert(node.mesh);
   name_targets(instance);
+  if (instance.to_scene.linear().determinant() == 0)
+    flattened_.push_back(fmt::format(
+        "{} \"{}\" is scaled by 0, which flattens its mesh; leave it out, or mend its scale", place, node.name));
   const std::size_t first = triangles_.size();
   for (std::size_t k = 0; k < instance.mesh.primitives.size(); ++k)
     add_primitive(instance, k, fmt::format("{}/primitives/{}", instance.place, k));
@@ -327,6 +331,7 @@ SurfaceFile GltfReader::finish() {
   surface.mesh = {vertex_array(vertices_), triangle_array(triangles_)};
   if (has_colours_) surface.colours = vertex_array(colours_);
   surface.files = document_.files;
+  surface.warnings = flattened_;
   if (!skeleton_.empty()) {
     surface.skeleton = skeleton_.data(surface.remarks);
     surface.skeleton->weights.setZero(std::ssize(bones_), static_cast<Eigen::Index>(skeleton_.size()));

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include "common/core/input_file.h"
+#include "common/core/log.h"
+#include "common/mesh/surface_check.h"
 #include "common/surface_io/obj_reader.h"
 #include "common/surface_io/ply_reader.h"
 #include "common/surface_io/stl_reader.h"
@@ -37,7 +39,16 @@ SurfaceFile read_surface_file(const std::filesystem::path& file) {
   if (const auto loose = settle_loose_vertices(triangles, surface.mesh.vertices); loose > 0)
     surface.remarks.push_back(fmt::format("{} vertices of no triangle are left out of account", loose));
   for (MorphTarget& morph : surface.morphs) settle_loose_vertices(triangles, morph.positions);
+  if (is_flat(surface.mesh.vertices))
+    surface.warnings.emplace_back(
+        "the surface is flat: as a body it is a sheet as thick as the cells that enclose it; give it a thickness, and "
+        "scale no object by 0");
   return surface;
+}
+
+void log_notes(const SurfaceFile& surface, const std::filesystem::path& file) {
+  for (const std::string& remark : surface.remarks) log::info(fmt::format("{}: {}", file.string(), remark));
+  for (const std::string& warning : surface.warnings) log::warning(fmt::format("{}: {}", file.string(), warning));
 }
 
 }  // namespace exmat::precompute

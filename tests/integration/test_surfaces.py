@@ -307,9 +307,34 @@ class Surfaces(unittest.TestCase):
         self.assertIn("it is a mirror image of the object", self.refused(examples=mirrored))
         _, printed = self.bundle(examples=mirrored, alignment={"accept": True})
         self.assertIn("[warning] example other: the cage misses the pose by", printed)
+        squeezed = self.points * [1, 1, 0]
+        write_obj(self.folder / "mirrored.obj", squeezed, self.triangles)
+        _, printed = self.bundle(examples=mirrored, alignment={"accept": True})
+        self.assertRegex(printed, "warning. example other: .*it squeezes the body to .* times its thickness")
         scattered = self.points[np.random.default_rng(1).permutation(len(self.points))]
         write_obj(self.folder / "mirrored.obj", scattered, self.triangles)
         self.assertRegex(self.refused(examples=mirrored), "example other: .* so its vertices are in another order")
+
+    def test_what_is_hardly_meant_is_warned_of(self):
+        def warning(name="asset.json", **changes):
+            return "\n".join(line for line in self.run_program("check", self.asset(name, **changes)).splitlines() if "[warning]" in line)
+        write_glb(self.folder / "flat.glb", self.points, self.triangles, node={"scale": [1, 1, 0]})
+        said = warning(object={"surface": "flat.glb", "cells": 100, "fixed": {"ids": [0]}})
+        self.assertIn('/nodes/0 "tube" is scaled by 0', said)
+        self.assertIn("flat.glb: the surface is flat", said)
+        write_obj(self.folder / "small.obj", self.points / 1000, self.triangles)
+        self.assertIn("the object is 0.00", warning(object={"surface": "small.obj", "fixed": {"ids": [0]}}))
+        write_obj(self.folder / "far.obj", self.points + 1e9, self.triangles)
+        self.assertIn("m from the origin", warning(object={"surface": "far.obj", "fixed": {"ids": [0]}}))
+        (self.folder / "bow.obj").write_text("".join(f"v {x} {y} {z}\n" for z in (0, 1) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1)))
+                                             + "f 1 3 2 4\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n")
+        self.assertIn("1 face whose edges cross is cut", warning(object={"surface": "bow.obj", "fixed": {"ids": [0]}}))
+
+    def test_names_of_targets_do_not_reach_the_terminal(self):
+        write_glb(self.folder / "names.glb", self.points, self.triangles, {"a\0b": self.points, "\x1b[31m\nred": self.points + 1})
+        said = self.run_program("new", "names.glb", "-o", "made")
+        self.assertRegex(said, r'"a\?b" moves no vertex|"\?\[31m\?red" moves the body as a whole')
+        self.assertNotRegex(said, r"[\0\x1b]")
 
     def test_nothing_is_done_again_where_nothing_has_changed(self):
         name = self.asset(examples=[{"name": "bend", "morph": "bend"}])

@@ -108,6 +108,26 @@ TEST(PolygonFaces, EndWithFacesThatAreNone) {
   }
 }
 
+TEST(PolygonFaces, WarnOfFacesThatCrossThemselves) {
+  const auto warnings = [](const Corners& corners) {
+    PolygonFaces faces;
+    std::vector<std::int32_t> polygon(corners.size());
+    std::iota(polygon.begin(), polygon.end(), 0);
+    faces.add(polygon);
+    return faces.cut_ears(corners, "a.obj");
+  };
+  Corners star;
+  for (int k = 0; k < 5; ++k)
+    star.push_back({std::cos(0.8 * std::numbers::pi * k), std::sin(0.8 * std::numbers::pi * k), 0});
+  for (const Corners& corners : {Corners{{0, 0, 0}, {1, 1, 0}, {1, 0, 0}, {0, 1, 0}},  // of loops that cancel
+                                 Corners{{0, 0, 0}, {3, 0, 1}, {1, 1, 0}, {2, 1, 1}}, star})
+    EXPECT_THAT(warnings(corners), testing::ElementsAre(testing::HasSubstr("1 face whose edges cross is cut into")));
+  for (const Corners& corners :
+       {Corners{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, Corners{{0, 0, 0}, {4, 0, 0}, {1, 1, 0}, {0, 4, 0}},
+        Corners(5, {1, 2, 3}), Corners{{0, 0, 0}, {1, 0, 0}, {3, 0, 0}, {2, 0, 0}}})
+    EXPECT_THAT(warnings(corners), testing::IsEmpty());
+}
+
 TEST(PolygonFaces, CoverLargeConcaveFaces) {
   std::vector<Point> points;
   for (int k = 0; k < 3000; ++k) points.emplace_back(std::cos(k * 1e-3), std::sin(k * 1e-3));
