@@ -1,5 +1,6 @@
 #include "common/console/console.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <csignal>
 #include <cstdio>
@@ -41,6 +42,14 @@ spdlog::level::level_enum spdlog_level(log::Level level) {
       return spdlog::level::err;
   }
   return spdlog::level::info;
+}
+
+/// Names out of files may hold characters that move a terminal's cursor, or begin a line of their own.
+std::string printable(std::string_view text) {
+  std::string shown(text);
+  std::ranges::replace_if(
+      shown, [](unsigned char c) { return c < 0x20 || c == 0x7f; }, '?');
+  return shown;
 }
 
 std::string describe(const ProgressReport& report) {
@@ -159,7 +168,8 @@ void apply(const CommonOptions& options) {
   const auto logger = std::make_shared<spdlog::logger>("exmat", std::make_shared<spdlog::sinks::stderr_sink_mt>());
   logger->set_pattern("[%H:%M:%S] [%l] %v");
   logger->set_level(spdlog::level::from_str(options.log_level));
-  log::set_sink([logger](log::Level level, std::string_view message) { logger->log(spdlog_level(level), message); });
+  log::set_sink(
+      [logger](log::Level level, std::string_view message) { logger->log(spdlog_level(level), printable(message)); });
   set_progress_sink(make_progress_sink(options.progress));
   if (options.threads > 0) omp_set_num_threads(options.threads);
 }
@@ -186,16 +196,17 @@ int run_program(CLI::App& app, int argc, char** argv, const std::function<void()
         stderr);
     return static_cast<int>(ExitStatus::kBadInput);
   } catch (const InputError& error) {
-    std::fputs((app.get_name() + ": " + error.what() + "\n").c_str(), stderr);
+    std::fputs((app.get_name() + ": " + printable(error.what()) + "\n").c_str(), stderr);
     return static_cast<int>(ExitStatus::kBadInput);
   } catch (const std::bad_alloc&) {
     std::fputs((app.get_name() + ": not enough memory\n").c_str(), stderr);
   } catch (const std::exception& error) {
     // The library names no file if printing fails.
     const bool printing = std::ferror(stdout) != 0 && dynamic_cast<const WorkError*>(&error) == nullptr;
-    std::fputs(
-        (app.get_name() + ": " + (printing ? "cannot write to standard output: " : "") + error.what() + "\n").c_str(),
-        stderr);
+    std::fputs(fmt::format("{}: {}{}\n", app.get_name(), printing ? "cannot write to standard output: " : "",
+                           printable(error.what()))
+                   .c_str(),
+               stderr);
   }
   return static_cast<int>(ExitStatus::kFailure);
 }

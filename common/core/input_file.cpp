@@ -61,10 +61,15 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 26> kWays{
      {".h5", "a bundle or a trajectory is no mesh: name the file that it was made of"},
      {".json", "an asset file is no mesh: name the file that it names"}}};
 
-bool is_utf16(std::string_view bytes) {
-  if (bytes.size() < 4) return false;
-  return (bytes.starts_with("\xff\xfe") && is_text(bytes[2]) && bytes[3] == '\0') ||
-         (bytes.starts_with("\xfe\xff") && is_text(bytes[3]) && bytes[2] == '\0');
+/// Name of the encoding, for iconv, of text that is not in UTF-8; empty where nothing says so.
+std::string utf16_of(std::string_view bytes) {
+  const auto is_wide = [&](std::size_t at, std::size_t low) {
+    return bytes.size() >= at + 2 && is_text(bytes[at + low]) && bytes[at + 1 - low] == '\0';
+  };
+  if ((bytes.starts_with("\xff\xfe") && is_wide(2, 0)) || (bytes.starts_with("\xfe\xff") && is_wide(2, 1)))
+    return "UTF-16";
+  if (is_wide(0, 0) && is_wide(2, 0)) return "UTF-16LE";
+  return is_wide(0, 1) && is_wide(2, 1) ? "UTF-16BE" : "";
 }
 
 }  // namespace
@@ -84,9 +89,9 @@ std::string read_whole_file(const std::filesystem::path& file, const std::string
 std::string read_text_file(const std::filesystem::path& file, const std::string& expected) {
   constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
   std::string bytes = read_whole_file(file, expected);
-  if (is_utf16(bytes))
-    throw InputError(
-        {file.string(), "", expected, "text in UTF-16", "save it as UTF-8, as iconv -f UTF-16 -t UTF-8 does"});
+  if (const std::string encoding = utf16_of(bytes); !encoding.empty())
+    throw InputError({file.string(), "", expected, "text in " + encoding,
+                      "save it as UTF-8, as iconv -f " + encoding + " -t UTF-8 does"});
   if (bytes.starts_with(kByteOrderMark) && bytes.size() > kByteOrderMark.size() &&
       is_text(bytes[kByteOrderMark.size()]))
     bytes.erase(0, kByteOrderMark.size());

@@ -38,7 +38,8 @@ void read_element_body(MshCursor& cursor, std::int32_t type, int node_count, std
   record.tags = read_tags(cursor, tag_count);
   if (type != kMshTetrahedron) {
     cursor.skip_ints(static_cast<std::uint64_t>(node_count), "a node tag");
-    return count_skipped(contents, type, 1);
+    ++contents.skipped[type];
+    return;
   }
   for (auto& corner : record.corners) {
     const std::int32_t tag = cursor.read_int("a node tag");

@@ -98,7 +98,7 @@ void skip_elements(MshCursor& cursor, const Block& block, int node_count, MshCon
     cursor.read_size("an element tag");
     cursor.skip_sizes(static_cast<std::uint64_t>(node_count), "a node tag");
   }
-  count_skipped(contents, block.kind, block.count);
+  contents.skipped[block.kind] += block.count;
 }
 
 }  // namespace

@@ -14,10 +14,6 @@ namespace {
 constexpr std::array<int, 32> kNodeCounts{0, 2,  3,  4,  4, 8,  6,  5,  3,  6,  9, 10, 27, 18, 14, 1,
                                           8, 20, 15, 13, 9, 10, 12, 15, 15, 21, 4, 5,  6,  20, 35, 56};
 
-bool is_volume_type(std::int32_t type) {
-  return (type >= 5 && type <= 7) || (type >= 12 && type <= 14) || (type >= 17 && type <= 19);
-}
-
 bool is_high_order_tetrahedron(std::int32_t type) { return type == 11 || (type >= 29 && type <= 31); }
 
 }  // namespace
@@ -62,10 +58,6 @@ std::int32_t read_physical_tag(MshCursor& cursor) {
   const std::int32_t tag = cursor.read_int("a physical tag");
   if (tag == std::numeric_limits<std::int32_t>::min()) cursor.fail("a physical tag", fmt::format("{}", tag));
   return std::abs(tag);
-}
-
-void count_skipped(MshContents& contents, std::int32_t element_type, std::size_t count) {
-  if (is_volume_type(element_type)) contents.skipped_volume_elements[element_type] += count;
 }
 
 }  // namespace exmat::precompute

@@ -48,14 +48,11 @@ struct MshContents {
   std::map<std::int32_t, std::string> volume_names;                 ///< physical volumes' names by their tags
   std::map<std::int32_t, std::vector<std::int32_t>> volume_groups;  ///< tets of each physical volume
   std::map<std::int32_t, std::vector<std::int32_t>> volume_tags;    ///< physical tags of each volume (4.1)
-  std::map<std::int32_t, std::size_t> skipped_volume_elements;      ///< numbers by element type
+  std::map<std::int32_t, std::size_t> skipped;                      ///< numbers of other elements by their types
 };
 
 /// The tag of a physical group, which a minus marks as turned round; 0 for none.
 std::int32_t read_physical_tag(MshCursor& cursor);
-
-/// Counts `count` elements of another type than tetrahedra, which are not used.
-void count_skipped(MshContents& contents, std::int32_t element_type, std::size_t count);
 
 /// The sections of version 2.2, from after "$NAME" to before "$EndNAME".
 void read_nodes_22(MshCursor& cursor, MshContents& contents);

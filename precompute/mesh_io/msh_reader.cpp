@@ -1,6 +1,7 @@
 #include "precompute/mesh_io/msh_reader.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <fmt/format.h>
 #include <limits>
@@ -94,27 +95,28 @@ void read_section(MshCursor& cursor, std::string_view section, Version version, 
   cursor.end_section(section);
 }
 
-/// Names of the volume elements that are no tetrahedra (Gmsh's manual, "MSH file format").
-std::string cell_name(std::int32_t type) {
-  switch (type) {
-    case 5:
-    case 12:
-    case 17:
-      return fmt::format("hexahedra (element type {})", type);
-    case 6:
-    case 13:
-    case 18:
-      return fmt::format("prisms (element type {})", type);
-    default:
-      return fmt::format("pyramids (element type {})", type);
-  }
-}
+/// Elements that are no tetrahedra (Gmsh's manual, "MSH file format").
+struct CellKind {
+  const char* name;
+  int dimension;
+  std::array<std::int32_t, 8> types;  // and 0, which is none
+};
+constexpr std::array<CellKind, 7> kCellKinds{{{"points", 0, {15}},
+                                              {"lines", 1, {1, 8, 26, 27, 28}},
+                                              {"triangles", 2, {2, 9, 20, 21, 22, 23, 24, 25}},
+                                              {"quadrangles", 2, {3, 10, 16}},
+                                              {"hexahedra", 3, {5, 12, 17}},
+                                              {"prisms", 3, {6, 13, 18}},
+                                              {"pyramids", 3, {7, 14, 19}}}};
 
-std::string other_cells(const MshContents& contents) {
-  std::string text;
-  for (const auto& [type, count] : contents.skipped_volume_elements)
-    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, cell_name(type));
-  return text;
+/// "12 triangles (element type 2)" for all of the file's that have at least this dimension.
+std::vector<std::string> other_cells(const MshContents& contents, int dimension) {
+  std::vector<std::string> cells;
+  for (const auto& [type, count] : contents.skipped)
+    for (const CellKind& kind : kCellKinds)
+      if (kind.dimension >= dimension && std::ranges::find(kind.types, type) != kind.types.end())
+        cells.push_back(fmt::format("{} {} (element type {})", count, kind.name, type));
+  return cells;
 }
 
 MshContents read_contents(MshCursor& cursor) {
@@ -128,18 +130,18 @@ MshContents read_contents(MshCursor& cursor) {
   for (const auto required : {"Nodes", "Elements"})
     if (!sections.contains(required)) cursor.fail(fmt::format("a ${} section", required), "the end of the file");
   if (contents.tets.empty()) {
-    const std::string cells = other_cells(contents);
-    cursor.fail("tetrahedra (element type 4)", cells.empty() ? "none" : cells,
-                cells.empty() ? "make the volume mesh with 'gmsh -3'"
-                              : "fill the volume with tetrahedra: 'gmsh -3' without recombination or extruded layers");
+    const std::vector<std::string> cells = other_cells(contents, 0);
+    cursor.fail("tetrahedra (element type 4)", cells.empty() ? "none" : fmt::format("{}", fmt::join(cells, ", ")),
+                other_cells(contents, 3).empty()
+                    ? "make the volume mesh with 'gmsh -3'"
+                    : "fill the volume with tetrahedra: 'gmsh -3' without recombination or extruded layers");
   }
   return contents;
 }
 
 void warn_of_skipped(const std::filesystem::path& file, const MshContents& contents) {
-  for (const auto& [type, count] : contents.skipped_volume_elements)
-    log::warning(
-        fmt::format("{}: {} {} are left out; only tetrahedra are used", file.string(), count, cell_name(type)));
+  for (const std::string& cells : other_cells(contents, 3))
+    log::warning(fmt::format("{}: {} are left out; only tetrahedra are used", file.string(), cells));
 }
 
 MeshFile to_mesh_file(const std::filesystem::path& file, MshContents contents) {

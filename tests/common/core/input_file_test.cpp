@@ -31,12 +31,17 @@ TEST(ReadTextFile, TakesEndsOfLinesOfAllSystems) {
 }
 
 TEST(ReadTextFile, RefusesUtf16) {
-  for (const std::string& bytes : {"\xff\xfev\0 \0"s, "\xfe\xff\0v\0 "s}) try {
+  for (const auto& [bytes, encoding] : {std::pair{"\xff\xfev\0 \0"s, "UTF-16 "},
+                                        {"\xfe\xff\0v\0 "s, "UTF-16 "},
+                                        {"v\0 \0"s, "UTF-16LE "},
+                                        {"\0v\0 "s, "UTF-16BE "}})
+    try {
       text_of(bytes);
       ADD_FAILURE();
     } catch (const InputError& error) {
-      EXPECT_THAT(error.what(), AllOf(HasSubstr("UTF-16"), HasSubstr("save it as UTF-8")));
+      EXPECT_THAT(error.what(), HasSubstr(std::string("save it as UTF-8, as iconv -f ") + encoding + "-t UTF-8 does"));
     }
+  EXPECT_EQ(text_of("v\0w"s), "v\0w"s);
 }
 
 TEST(KindOfFile, IsToldByTheFirstBytes) {

@@ -210,7 +210,7 @@ constexpr std::array kMalformed{
     MalformedMsh{"NegativeTagCount", kSound22, "4 2 7 1", "4 -2 7 1", "line 18", "the number of tags", "-2"},
     MalformedMsh{"HugeTagCount", kSound22, "4 2 7 1", "4 2000000000 7 1", "line 18", "a tag", "the end of the line"},
     MalformedMsh{"NoTets", kSound22, "2 4 2 7 1 10 20 30 40", "2 3 2 7 1 10 20 30 40", "line 21",
-                 "tetrahedra (element type 4)", "none"},
+                 "tetrahedra (element type 4)", "1 triangles (element type 2), 1 quadrangles (element type 3)"},
     MalformedMsh{"UnclosedUnknownSection", kSound41, "$Nodes\n", "$Notes\n", "line 8", "$EndNotes after $Notes",
                  "the end of the file"},
     MalformedMsh{"Partitioned", kSound41, "$Nodes\n", "$PartitionedEntities\n", "line 8", "a mesh in one piece",
