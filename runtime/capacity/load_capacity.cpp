@@ -94,6 +94,7 @@ double LoadCapacity::lost_share(const Eigen::VectorXd& load) const {
   Eigen::VectorXd free(unknowns());
   for (std::size_t i = 0; i < place_.size(); ++i)
     if (place_[i] >= 0) free.segment<3>(place_[i]) = load.segment<3>(3 * static_cast<Eigen::Index>(i));
+  if (const double largest = free.cwiseAbs().maxCoeff(); largest > 0) free /= largest;  // squares of others may be 0
   const double whole = free.dot(full_.solve(free));
   if (!(whole > 0)) return 0;
   const Eigen::VectorXd reduced = reduced_basis_.transpose() * free;

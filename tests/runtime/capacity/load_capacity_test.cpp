@@ -55,6 +55,7 @@ TEST_P(Capacities, AreThoseOfTheFullMatrices) {
     const double expected = dense_share(bar_, capacity.time_scale(), load);
     EXPECT_NEAR(capacity.lost_share(load), expected, 1e-7);
     EXPECT_GT(expected, 0.01);
+    for (const double size : {1e-200, 1e200}) EXPECT_NEAR(capacity.lost_share(size * load), expected, 1e-7) << size;
   }
   EXPECT_EQ(capacity.lost_share(0 * spread), 0);
 }
