@@ -16,6 +16,7 @@ namespace {
 constexpr std::size_t kTestsPerCorner = 10'000, kTests = 200'000'000;
 
 constexpr double kRounding = 1e-12;  // of areas of a face of unit size
+constexpr std::size_t kMostCompared = 4096;  // corners of a face whose edges are compared with each other
 
 using Point = Eigen::Vector2d;
 
@@ -142,7 +143,7 @@ std::vector<std::string> PolygonFaces::cut_ears(const std::vector<std::array<dou
                         "export the mesh triangulated"});
     std::size_t next = first;
     for (const auto& [a, b, c] : cut) triangles_[next++] = {polygon[a], polygon[b], polygon[c]};
-    if (crosses_itself(points) && ++crossing == 1) first_crossing = polygon;
+    if (points.size() <= kMostCompared && crosses_itself(points) && ++crossing == 1) first_crossing = polygon;
   }
   if (crossing == 0) return {};
   std::string corners;
