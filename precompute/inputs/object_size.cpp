@@ -1,6 +1,7 @@
 #include "precompute/inputs/object_size.h"
 
 #include <fmt/format.h>
+#include <limits>
 
 #include "common/core/error.h"
 #include "common/core/log.h"
@@ -10,6 +11,8 @@ namespace exmat::precompute {
 namespace {
 
 constexpr double kUsualGravity = 9.81;  // [m/s^2]
+constexpr double kSoftest = 1e12;       // weight of a column as high as the body is long over Young's modulus, at most
+constexpr double kLostShare = 1e-9;     // of the length, by rounding: solvers ask for as much
 
 }  // namespace
 
@@ -28,6 +31,17 @@ std::string remark_on_size(const TetMesh& mesh, const TetMaterials& materials) {
         "its length is {:.3g} times its Young's modulus of {:.3g} Pa); {}",
         length, density, strain, modulus, advice);
   if (length > kLargest) return fmt::format("the object is {:.3g} m long; {}", length, advice);
+  if (length < kSmallest)
+    return fmt::format(
+        "the object is {:.3g} m long; is that its size in metres? If not, mend object.unit or object.scale of the "
+        "asset (--write-asset FILE writes the asset of a surface)",
+        length);
+  const double far = mesh.vertices.cwiseAbs().maxCoeff(), gap = far * std::numeric_limits<double>::epsilon();
+  if (gap > kLostShare * length)
+    return fmt::format(
+        "the object is {:.3g} m long and up to {:.3g} m from the origin, where numbers of 16 digits are {:.1g} m "
+        "apart: finer detail is lost; move it to the origin, and place bodies by their scene",
+        length, far, gap);
   return {};
 }
 
@@ -43,6 +57,14 @@ void require_numbers(const TetMesh& mesh, const TetMaterials& materials, const s
   };
   require("density", materials.density, length * length * length, "product with the cube of the length");
   require("youngs_modulus", materials.youngs_modulus, length, "product with the length");
+  const double weight = materials.density.maxCoeff() * kUsualGravity * length,
+               softest = materials.youngs_modulus.minCoeff();
+  if (softest * kSoftest < weight)
+    throw InputError(
+        {file, "/object/material/youngs_modulus",
+         fmt::format("at least {:.2g} Pa, {:g} of density x 9.81 m/s^2 x length, below which modes are not found",
+                     weight / kSoftest, 1 / kSoftest),
+         fmt::format("{:g} of a body {:.3g} m long", softest, length), "mend the number or its unit"});
 }
 
 void warn_of_size(const ObjectInput& object, const std::string& name, std::vector<std::string>& warnings) {

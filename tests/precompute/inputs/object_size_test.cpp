@@ -12,8 +12,9 @@ namespace {
 using testing::AllOf;
 using testing::HasSubstr;
 
-std::string remark(double length, double modulus, double density = 1000) {
-  const TetMesh mesh = exmat::test::box_mesh({4, 1, 1}, {length, length / 4, length / 4});
+std::string remark(double length, double modulus, double density = 1000, double place = 0) {
+  TetMesh mesh = exmat::test::box_mesh({4, 1, 1}, {length, length / 4, length / 4});
+  mesh.vertices.array() += place;
   TetMaterials materials;
   materials.density = Eigen::VectorXd::Constant(mesh.tet_count(), density);
   materials.youngs_modulus = Eigen::VectorXd::Constant(mesh.tet_count(), modulus);
@@ -40,6 +41,17 @@ TEST(ObjectSize, TheReasonIsNamed) {
   EXPECT_THAT(remark(60, 1e9), HasSubstr("the object is 60 m long; "));
 }
 
+TEST(ObjectSize, MetresWrittenAsMillimetresAreRemarkedOn) {
+  EXPECT_THAT(remark(0.00175, 1e6), AllOf(HasSubstr("0.00175 m long"), HasSubstr("object.unit")));
+  EXPECT_EQ(remark(0.01, 1e6), "");
+}
+
+// 2^-52 of a thousand million metres is a quarter of a micrometre.
+TEST(ObjectSize, PlacesThatLoseDigitsAreRemarkedOn) {
+  EXPECT_THAT(remark(1, 1e6, 1000, 1e9), AllOf(HasSubstr("1e+09 m from the origin"), HasSubstr("are 2e-07 m apart")));
+  EXPECT_EQ(remark(1, 1e6, 1000, 1e6), "");
+}
+
 // Whatever is beyond would end in a solver, without a word of the number that it came from.
 TEST(RequireNumbers, NamesNumbersThatDoublePrecisionCannotHold) {
   const TetMesh mesh = exmat::test::box_mesh({4, 1, 1}, {2, 0.5, 0.5});
@@ -61,6 +73,8 @@ TEST(RequireNumbers, NamesNumbersThatDoublePrecisionCannotHold) {
   EXPECT_THAT(refusal(1e-300, 1e6), HasSubstr("found 1e-300 of a body 2 m long"));
   EXPECT_THAT(refusal(1000, 1e300), HasSubstr("/object/material/youngs_modulus"));
   EXPECT_THAT(refusal(1000, 1e-300), HasSubstr("/object/material/youngs_modulus"));
+  EXPECT_EQ(refusal(1000, 1e-5), "");
+  EXPECT_THAT(refusal(1000, 1e-14), HasSubstr("expected at least 2e-08 Pa, 1e-12 of density x 9.81 m/s^2 x length"));
 }
 
 }  // namespace
