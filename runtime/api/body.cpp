@@ -149,6 +149,10 @@ exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* point
   if (const exmat_status status = require_rows(__func__, points->set)) return status;
   const RowMatrix& rows = points->set.basis_rows;
   EXMAT_REQUIRE_LENGTH(coordinates, rows.rows());
+  // Steps in the modes say themselves where numbers are not finite, those in all vertices would end with such.
+  if (const double* const far = body->full() != nullptr ? find_far(forces, coordinates) : nullptr)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: forces: %g: expected finite numbers of at most %g in full space", __func__,
+                *far, kFarthest);
   const BodyFrame& frame = *body->model().frame;
   const Placement placement = frame.placement(body->state.frame);
   Eigen::VectorXd& sum = body->force;

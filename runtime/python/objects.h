@@ -11,6 +11,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -336,6 +337,17 @@ template <typename Object>
 using MadeCaster = CheckedCaster<Object, type_caster_base<Object>>;
 template <typename Object>
 using SharedCaster = CheckedCaster<Object, copyable_holder_caster<Object, std::shared_ptr<Object>>>;
+
+/// Refuses arrays of complex numbers, whose imaginary parts would be lost, and of texts.
+template <>
+class type_caster<exmat::python::Numbers> : public pyobject_caster<exmat::python::Numbers> {
+ public:
+  bool load(handle source, bool convert) {
+    const bool is_array = isinstance<array>(source);
+    const char kind = is_array ? reinterpret_borrow<array>(source).dtype().kind() : 'f';
+    return std::string_view("biufO").find(kind) != std::string_view::npos && pyobject_caster::load(source, convert);
+  }
+};
 
 /// Says what it expects where pybind11 lists types of C++.
 template <std::size_t kCount>

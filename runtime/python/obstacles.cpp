@@ -53,21 +53,27 @@ SharedShape capsule(const Vector3& start, const Vector3& end, double radius) {
   return shape;
 }
 
-/// Rows of three, whole numbers that fit.
-std::vector<std::int32_t> corners_of(const py::array& triangles) {
+/// Rows of three vertices of so many.
+std::vector<std::int32_t> corners_of(const py::array& triangles, std::int64_t vertices) {
   const Ids numbers = whole_numbers(triangles, "triangles");
   if (triangles.ndim() != 2) throw Error(EXMAT_INVALID_ARGUMENT, "triangles: expected an array of shape (f, 3)");
   require_shape(triangles, "triangles", {triangles.shape(0), 3});
   std::vector<std::int32_t> corners;
-  for (const std::int64_t corner : read_span(numbers))
-    corners.push_back(static_cast<std::int32_t>(std::clamp<std::int64_t>(corner, -1, 2147483647)));
+  for (const std::int64_t corner : read_span(numbers)) {
+    if (corner < 0 || corner >= vertices)
+      throw Error(EXMAT_INVALID_ARGUMENT,
+                  ("triangles[" + std::to_string(corners.size()) + "] = " + std::to_string(corner) +
+                   ": expected a vertex, 0 to " + std::to_string(vertices - 1))
+                      .c_str());
+    corners.push_back(static_cast<std::int32_t>(corner));
+  }
   return corners;
 }
 
 SharedShape mesh(const Numbers& vertices, const py::array& triangles, double thickness) {
   if (vertices.ndim() != 2) throw Error(EXMAT_INVALID_ARGUMENT, "vertices: expected an array of shape (v, 3)");
   require_shape(vertices, "vertices", {vertices.shape(0), 3});
-  const std::vector<std::int32_t> corners = corners_of(triangles);
+  const std::vector<std::int32_t> corners = corners_of(triangles, vertices.shape(0));
   SharedShape shape = made_of(EXMAT_MESH, py::make_tuple(vertices.attr("copy")(), triangles.attr("copy")(), thickness));
   shape->arrays = Shape::mesh(read_span(vertices), corners, thickness);
   return shape;

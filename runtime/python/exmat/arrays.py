@@ -9,6 +9,14 @@ from .errors import InvalidArgument
 StrPath = Union[str, "os.PathLike[str]"]
 
 
+def numbers(values: Any, name: str) -> Any:
+    """`values` as doubles, True as 1; `name` is for the message."""
+    given = np.asarray(values)
+    if given.dtype.kind not in "fiub":
+        raise InvalidArgument(f"{name}: expected real numbers")
+    return given.astype("f8")
+
+
 def array(values: Any, name: str, width: int, kind: str) -> Any:
     """`values` as (..., width) of the type `kind`; `name` is for the message."""
     given = np.asarray(values)
@@ -38,4 +46,4 @@ def surface_arrays(vertices: Any, triangles: Any) -> Tuple[Any, Any]:
     return points, cells(triangles, "triangles", 3, len(points), "i8")
 
 
-__all__: List[str] = ["StrPath", "array", "cells", "surface_arrays"]
+__all__: List[str] = ["StrPath", "array", "cells", "numbers", "surface_arrays"]

@@ -72,8 +72,8 @@ class _File(Mapping[str, Field]):
         self._dataset_type = h5py.Dataset
         try:
             self._file: Any = h5py.File(path, "r")
-        except OSError as error:
-            raise BadInput(f"{os.fspath(path)}: expected an HDF5 file of exmat, found none that can be opened: {error}") from None
+        except (OSError, ValueError) as error:
+            raise BadInput(f"{os.fspath(path)}: expected an HDF5 file of exmat, found {_found(path, str(error))}") from None
         found = _text(self._file.attrs.get("format", ""))
         if found != self._format:
             self._file.close()
@@ -167,6 +167,17 @@ class Bundle(_File):
     def features(self) -> List[str]:
         """The groups that it has."""
         return list(self.attributes["features"])
+
+
+def _found(path: StrPath, reason: str) -> str:
+    """What is there in place of a file that HDF5 opens."""
+    if not os.path.exists(path):
+        return "no such file"
+    if not os.path.isfile(path):
+        return "a folder" if os.path.isdir(path) else "a pipe or a device, no regular file"
+    if "lock" in reason or "already open" in reason:
+        return "one that another program has open to write, or has locked; close it there, or read a copy"
+    return "another kind of file" if "signature" in reason else "one that cannot be opened: " + " ".join(reason.split())
 
 
 def _text(value: Any) -> str:

@@ -2,7 +2,7 @@
 import json
 import os
 import pathlib
-from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
+from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple, Union
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from .errors import InvalidArgument
 from .surfaces import write_glb
 
 PATHS = ("mesh", "surface", "render_mesh", "file", "landmarks", "asset", "scene", "bundle", "exact_examples", "poses")
+_TOO_DEEP = "expected members as JSON has them, found some that are nested hundreds deep, or hold themselves"
 
 
 def write_mesh(path: StrPath, vertices: Any, tets: Any) -> None:
@@ -62,9 +63,8 @@ def _take_object(given: Mapping[str, Any], members: Dict[str, Any], folder: path
         members["mesh"] = _mesh_file(given["mesh"], folder / "object.vtk", None, "object.mesh")
     surface = given.get("render_mesh")
     if surface is not None and not isinstance(surface, (str, os.PathLike)):
-        path = folder / "render_mesh.obj"
-        write_surface(path, *_pair(surface, "object.render_mesh", "triangles"))
-        members["render_mesh"] = str(path)
+        place = "object.render_mesh"
+        members["render_mesh"] = _written(write_surface, folder / "render_mesh.obj", _pair(surface, place, "triangles"), place)
 
 
 def _take_surfaces(given: Any, examples: Any, members: Dict[str, Any], folder: pathlib.Path) -> None:
@@ -72,15 +72,13 @@ def _take_surfaces(given: Any, examples: Any, members: Dict[str, Any], folder: p
     surface = given.get("surface") if isinstance(given, Mapping) else None
     poses: Dict[str, Any] = {}
     for place, example in enumerate(examples):
-        pose = example.get("surface")
+        pose, name = example.get("surface"), f"examples[{place}].surface"
         if pose is None or isinstance(pose, (str, os.PathLike)):
             continue
         if isinstance(pose, (tuple, Mapping)):
-            path = folder / f"example_{place}.obj"
-            write_surface(path, *_pair(pose, f"examples[{place}].surface", "triangles"))
-            members["examples"][place]["surface"] = str(path)
+            members["examples"][place]["surface"] = _written(write_surface, folder / f"example_{place}.obj", _pair(pose, name, "triangles"), name)
         elif surface is None or isinstance(surface, (str, os.PathLike)):
-            raise InvalidArgument(f"examples[{place}].surface: expected (vertices, triangles), or vertices alone where the object's surface is "
+            raise InvalidArgument(f"{name}: expected (vertices, triangles), or vertices alone where the object's surface is "
                                   "given in arrays; found vertices alone")
         elif "name" not in example:
             raise InvalidArgument(f"examples[{place}]: expected a name, found none")
@@ -105,7 +103,15 @@ def _mesh_file(mesh: Any, path: pathlib.Path, tets: Optional[Any], place: str) -
             raise InvalidArgument(f"{place}: expected (vertices, tets), or vertices alone where the rest example or the object is given so; "
                                   "found vertices alone")
         mesh = (mesh, tets)
-    write_mesh(path, *_pair(mesh, place, "tets"))
+    return _written(write_mesh, path, _pair(mesh, place, "tets"), place)
+
+
+def _written(write: Callable[..., None], path: pathlib.Path, mesh: Tuple[Any, Any], place: str) -> str:
+    """The path, once the file is written; `place` is for the message."""
+    try:
+        write(path, *mesh)
+    except InvalidArgument as error:
+        raise InvalidArgument(f"{place}: {error}") from None
     return str(path)
 
 
@@ -126,10 +132,17 @@ def _tets_of_poses(examples: Any, given: Any) -> Optional[Any]:
     return None
 
 
-def plain_members(value: Any, key: str = "") -> Any:
+def plain_members(value: Any) -> Any:
     """As JSON has it: arrays as lists, paths absolute. Meshes in arrays are left out."""
+    try:
+        return _plain(value, "")
+    except RecursionError:
+        raise InvalidArgument(_TOO_DEEP) from None
+
+
+def _plain(value: Any, key: str) -> Any:
     if isinstance(value, Mapping):
-        return {str(name): plain_members(member, str(name)) for name, member in value.items()}
+        return {str(name): _plain(member, str(name)) for name, member in value.items()}
     if isinstance(value, os.PathLike) or (isinstance(value, str) and key in PATHS):
         return os.path.abspath(value)
     if key in ("mesh", "surface", "render_mesh"):
@@ -138,7 +151,7 @@ def plain_members(value: Any, key: str = "") -> Any:
         return value.tolist()
     if isinstance(value, np.generic):
         return value.item()
-    return [plain_members(member) for member in value] if isinstance(value, (list, tuple)) else value
+    return [_plain(member, "") for member in value] if isinstance(value, (list, tuple)) else value
 
 
 def _write_json(path: pathlib.Path, members: Mapping[str, Any]) -> pathlib.Path:
@@ -149,6 +162,8 @@ def _write_json(path: pathlib.Path, members: Mapping[str, Any]) -> pathlib.Path:
 def json_text(members: Mapping[str, Any]) -> str:
     try:
         return json.dumps(members, indent=1)
+    except RecursionError:
+        raise InvalidArgument(_TOO_DEEP) from None
     except TypeError as error:
         raise InvalidArgument(f"expected members as JSON has them: {error}") from None
 

@@ -4,6 +4,8 @@ import os
 import pathlib
 from typing import Any, Dict, Mapping, Optional, Sequence, Tuple, Union
 
+import numpy as np
+
 from . import _exmat
 from .arrays import StrPath
 from .errors import BadInput, InvalidArgument
@@ -75,8 +77,8 @@ class Model(_exmat.Model):
             use_examples = any(value is not None for value in examples.values())
         others = dict(time_step=time_step, gravity=gravity, integrator=integrator, internal_force=internal_force,
                       mass_damping=mass_damping, stiffness_damping=stiffness_damping, newton_iterations=newton_iterations,
-                      newton_tolerance=newton_tolerance, use_examples=_flag("use_examples", use_examples),
-                      use_contact=_flag("use_contact", use_contact),
+                      newton_tolerance=newton_tolerance, use_examples=flag("use_examples", use_examples),
+                      use_contact=flag("use_contact", use_contact),
                       sleep_energy=sleep_energy, sleep_time=sleep_time, precision=precision, space=space,
                       space_release=space_release)
         self._load(bundle, {name: value for name, value in {**others, **examples}.items() if value is not None})
@@ -90,6 +92,7 @@ class Model(_exmat.Model):
         World.from_scene().
         """
         model = cls.__new__(cls)
+        flag("use_contact", use_contact)
         if isinstance(scene, Mapping):
             model._load_members(plain_members(scene), use_contact)
         elif use_contact and os.path.exists(scene):
@@ -154,8 +157,8 @@ class Model(_exmat.Model):
         return f"<exmat.Model {_name(self._recipe)}: {self.modes} modes, {self.vertices} vertices, {self.examples} examples>"
 
 
-def _flag(name: str, value: Any) -> int:
-    if value not in (False, True):
+def flag(name: str, value: Any) -> int:
+    if not any(value is known for known in (False, True, 0, 1)) and not isinstance(value, np.bool_):
         raise InvalidArgument(f"{name} = {value!r}: expected True or False")
     return int(value)
 

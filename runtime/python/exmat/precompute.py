@@ -16,7 +16,7 @@ import tempfile
 import threading
 from typing import Any, Callable, Iterator, List, Mapping, NamedTuple, Optional, Sequence, Union
 
-from .errors import BadInput, Cancelled, Failure
+from .errors import BadInput, Cancelled, Failure, InvalidArgument
 from .inputs import write_asset, write_members, write_mesh, write_surface
 from .surfaces import write_glb
 
@@ -110,13 +110,17 @@ class Job:
         self.latest: Optional[Progress] = None  #: the last progress that poll() saw
         self.log: List[str] = []  #: lines of the program's log
         self.output = ""  #: what it printed, when it has ended
-        command = [_program(program), "--progress", "json", "--threads", str(threads), *arguments]
+        self._program = _program(program)
+        command = [self._program, "--progress", "json", "--threads", str(threads), *arguments]
         try:
             self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True,
                                              errors="replace")
         except OSError as error:
             folder.cleanup()
-            raise Failure(f"{command[0]}: {error.strerror}; expected the program exmat-precompute") from None
+            raise Failure(f"{self._program}: {error.strerror}; expected the program exmat-precompute") from None
+        except ValueError:
+            folder.cleanup()
+            raise InvalidArgument("expected paths as text, found a zero byte") from None
         self._readers = [threading.Thread(target=self._read_errors, daemon=True), threading.Thread(target=self._read_output, daemon=True)]
         for reader in self._readers:
             reader.start()
@@ -167,7 +171,10 @@ class Job:
                 raise Cancelled("cancelled; nothing was written")
             if self._process.returncode != 0:
                 raise (BadInput if self._process.returncode == 2 else Failure)(self._message())
-            return self._finish(self)
+            try:
+                return self._finish(self)
+            except (OSError, ValueError):
+                raise Failure(f"{self._program}: it ended without a result; expected the program exmat-precompute") from None
         finally:
             self._folder.cleanup()
 
@@ -254,7 +261,13 @@ def check(asset: Members, progress: Optional[Listener] = None, *, alignment_repo
     arguments = ["check", str(write_asset(asset, pathlib.Path(folder.name)))]
     if alignment_report is not None:
         arguments += ["--alignment-report", os.path.abspath(alignment_report)]
-    found: CheckReport = Job(arguments, lambda job: CheckReport(_examples(job.output), job.warnings), folder, progress, program, threads).result()
+
+    def finish(job: Job) -> CheckReport:
+        if ": sound, " not in job.output:
+            raise ValueError
+        return CheckReport(_examples(job.output), job.warnings)
+
+    found: CheckReport = Job(arguments, finish, folder, progress, program, threads).result()
     return found
 
 
@@ -288,6 +301,8 @@ def study(given: Members, folder: StrPath, progress: Optional[Listener] = None, 
 def _program(given: Optional[StrPath]) -> str:
     name = "exmat-precompute"
     if given is not None:
+        if not isinstance(given, (str, os.PathLike)) or "\0" in os.fspath(given):
+            raise InvalidArgument(f"program = {given!r}: expected the path of the program exmat-precompute")
         return os.fspath(given)
     if "EXMAT_PRECOMPUTE" in os.environ:
         return os.environ["EXMAT_PRECOMPUTE"]

@@ -6,7 +6,7 @@ from typing import Any, Dict, List, Mapping, Optional
 
 import numpy as np
 
-from .arrays import StrPath, surface_arrays
+from .arrays import StrPath, numbers, surface_arrays
 from .errors import InvalidArgument
 
 FLOAT, INDEX = 5126, 5125  # types of accessors: float, unsigned int
@@ -26,13 +26,13 @@ def write_glb(path: StrPath, vertices: Any, triangles: Any, poses: Optional[Mapp
     primitive: Dict[str, Any] = {"attributes": {"POSITION": file.add(points, "VEC3", FLOAT, VERTICES)},
                                  "indices": file.add(faces.reshape(-1), "SCALAR", INDEX, CORNERS), "mode": 4}
     for name, marks in (parts or {}).items():
-        values = np.asarray(marks, "f8")
+        values = numbers(marks, f"part {name}")
         if values.shape != (len(points),):
             raise InvalidArgument(f"part {name}: shape {values.shape}: expected ({len(points)},), a number for each vertex")
         primitive["attributes"][part_name(name)] = file.add(values, "SCALAR", FLOAT, VERTICES)
     targets = []
     for name, pose in (poses or {}).items():
-        moved = np.asarray(pose, "f8")
+        moved = numbers(pose, f"pose {name}")
         if moved.shape != points.shape:
             raise InvalidArgument(f"pose {name}: shape {moved.shape}: expected {points.shape}, a place for each vertex")
         targets.append({"POSITION": file.add(moved - points, "VEC3", FLOAT, VERTICES)})

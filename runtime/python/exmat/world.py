@@ -6,7 +6,7 @@ from . import _exmat
 from .arrays import StrPath
 from .errors import BadInput
 from .inputs import json_text, plain_members
-from .model import Model, world_name
+from .model import Model, flag, world_name
 
 
 class World(_exmat.World):
@@ -26,7 +26,7 @@ class World(_exmat.World):
     _recipe: Optional[Tuple[str, Any]] = None
 
     def __init__(self, *, stiffness: float = 1e6, damping: float = 0.0, friction: float = 0.0, self_contact: bool = False) -> None:
-        _exmat.World.__init__(self, stiffness, damping, friction, self_contact)
+        _exmat.World.__init__(self, stiffness, damping, friction, bool(flag("self_contact", self_contact)))
 
     @classmethod
     def from_scene(cls, scene: Union[StrPath, Mapping[str, Any]]) -> "World":

@@ -1,10 +1,14 @@
 """Exceptions, threads and memory."""
+import fcntl
 import gc
 import os
 import pickle
 import resource
 import signal
+import subprocess
+import sys
 import threading
+import warnings
 
 import numpy as np
 import pytest
@@ -219,6 +223,22 @@ def test_numbers_whose_results_would_not_be_finite_are_refused(model):
     assert np.isfinite(body.positions(corner)).all() and np.isfinite(model.elasticity(0 * far + 1e30)[0])
 
 
+def test_forces_as_large_as_they_may_be_end_in_places_or_in_words(bundle):
+    for space in ("reduced", "full", "auto"):
+        model = exmat.Model(bundle, space=space)
+        body, points = exmat.Body(model), exmat.Points.all_vertices(model)
+        point = exmat.Points(model, [300])
+        if space != "reduced":
+            with pytest.raises(exmat.InvalidArgument, match=r"1e\+154: expected finite numbers of at most 1e\+30 in full space"):
+                body.apply_forces(point, np.array([[0, 1e154, 0]]))
+        body.apply_forces(point, np.array([[1e30, 0, -1e30]]))
+        try:
+            body.step(3)
+        except exmat.NonFinite:
+            pass
+        assert np.isfinite(body.positions(points)).all(), space
+
+
 def test_a_path_with_a_zero_byte_is_refused(bundle):
     for path in (str(bundle) + "\0junk", "a\0b"):
         with pytest.raises(exmat.InvalidArgument, match="expected text, found a zero byte$"):
@@ -254,3 +274,74 @@ def test_a_child_of_fork_steps_on(model):
         os._exit(0)
     assert os.waitpid(child, 0)[1] == 0
     batch.step(2, threads=2)
+
+
+def test_complex_numbers_are_refused(model, body):
+    points = exmat.Points(model, [0])
+    imaginary = np.full((1, 3), 1j)
+    for call in (lambda: body.apply_forces(points, imaginary), lambda: exmat.Points.at(model, imaginary), lambda: body.set_reduced(np.full(12, 1j), np.zeros(12)),
+                 lambda: exmat.Shape.height_field(np.full((2, 2), 1j), (1, 1)), lambda: body.set_reduced(np.full(12, "1"), np.zeros(12))):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            with pytest.raises(TypeError, match="expected .*numpy.float64"):
+                call()
+    with pytest.raises(exmat.InvalidArgument, match="pose bend: expected real numbers"):
+        exmat.precompute.write_glb("none.glb", np.eye(3), [[0, 1, 2]], {"bend": np.eye(3) * 1j})
+
+
+def test_corners_of_obstacles_are_named_as_they_were_given():
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])
+    for corner in (-1, -5, 3, 2**32 + 2, 2**62):
+        with pytest.raises(exmat.InvalidArgument, match=rf"triangles\[2\] = {corner}: expected a vertex, 0 to 2"):
+            exmat.Shape.mesh(corners, np.array([[0, 1, corner]]), 0.1)
+
+
+def test_flags_are_true_or_false(model):
+    for call in (lambda: exmat.World(self_contact=2), lambda: exmat.World(self_contact="no"), lambda: exmat.Model.from_scene({}, use_contact=2)):
+        with pytest.raises(exmat.InvalidArgument, match="_contact = .*: expected True or False"):
+            call()
+    assert exmat.World(self_contact=np.bool_(True)).contact_law.self_contact
+
+
+def test_a_pose_of_other_vertices_is_named():
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    asset = {"name": "tet", "object": {"mesh": (corners, [[0, 1, 2, 3]])}, "examples": [{"name": "bend", "mesh": corners[:3]}]}
+    with pytest.raises(exmat.InvalidArgument, match=r"^examples\[0\].mesh: tets\[0, 3\] = 3: expected a vertex, 0 to 2"):
+        exmat.precompute.check(asset)
+
+
+def test_members_that_hold_themselves_are_refused(tmp_path):
+    endless = {"name": "x"}
+    endless["object"] = endless
+    deep = []
+    for _ in range(5000):
+        deep = [deep]
+    for members in (endless, {"name": deep}):
+        with pytest.raises(exmat.InvalidArgument, match="nested hundreds deep"):
+            exmat.precompute.check(members)
+        with pytest.raises(exmat.InvalidArgument, match="nested hundreds deep"):
+            exmat.Model.from_scene(members)
+
+
+def test_other_programs_are_failures(tmp_path):
+    asset = tmp_path / "asset.json"
+    for program in ("/bin/true", "/nowhere/program", "/tmp", ""):
+        for call in (lambda: exmat.precompute.check(asset, program=program), lambda: exmat.precompute.bundle(asset, tmp_path / "a.h5", program=program),
+                     lambda: exmat.precompute.study(asset, tmp_path / "s", program=program)):
+            with pytest.raises(exmat.Failure, match="expected the program exmat-precompute"):
+                call()
+    for program in (5, "a\0b"):
+        with pytest.raises(exmat.InvalidArgument, match="program = "):
+            exmat.precompute.check(asset, program=program)
+
+
+def test_files_that_are_no_bundles_are_said_in_words(tmp_path, bundle):
+    text = tmp_path / "text.h5"
+    text.write_text("x" * 100)
+    for path, found in ((tmp_path / "none.h5", "no such file"), (tmp_path, "a folder"), ("/dev/null", "a pipe or a device"), (text, "another kind of file")):
+        with pytest.raises(exmat.BadInput, match=f"expected an HDF5 file of exmat, found {found}"):
+            exmat.Bundle(path)
+    with open(bundle, "rb+") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        child = subprocess.run([sys.executable, "-c", "import exmat, sys; exmat.Bundle(sys.argv[1])", bundle], capture_output=True, text=True)
+    assert "has locked; close it there, or read a copy" in child.stderr.splitlines()[-1]
