@@ -15,7 +15,7 @@ namespace {
 // cube of their number.
 constexpr std::size_t kTestsPerCorner = 10'000, kTests = 200'000'000;
 
-constexpr double kRounding = 1e-12;  // of areas of a face of unit size
+constexpr double kRounding = 1e-12;          // of areas of a face of unit size
 constexpr std::size_t kMostCompared = 4096;  // corners of a face whose edges are compared with each other
 
 using Point = Eigen::Vector2d;

@@ -155,7 +155,7 @@ void bind_capacity(py::module_& module) {
 void bind_ray_hit(py::module_& module) {
   const auto array = [](const std::array<double, 3>& numbers) { return py::array_t<double>(3, numbers.data()); };
   py::class_<RayHit>(module, "RayHit", "A point of a surface that a ray meets.")
-      .def_readonly("triangle", &RayHit::triangle)
+      .def_readonly("triangle", &RayHit::triangle, "Its number in the surface.")
       .def_property_readonly(
           "shares", [array](const RayHit& hit) { return array(hit.shares); },
           "Those of the triangle's corners, shape (3,), sum 1, as Surface.points() takes them.")

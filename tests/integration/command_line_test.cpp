@@ -129,14 +129,14 @@ TEST_F(CommandLine, OutputsThatCannotBeWrittenAreNamed) {
   const auto asset = write_small_bar(folder_);
   const auto before = folder_.names();
   const std::string missing = folder_.path("missing/bundle.h5"), folder = folder_.path("");
-  expect_refused(bundle(asset, folder), kFailure, {folder, "folder"});
+  expect_refused(bundle(asset, folder), kBadInput, {folder, "folder"});
   expect_refused(bundle(asset, missing), kFailure, {missing, "no folder"});
   EXPECT_EQ(folder_.names(), before);
 
   make_bundle();
   const auto scene = write_scene(folder_, {{"steps", 5}});
   const auto with_bundle = folder_.names();
-  expect_refused(run(scene, {"-o", folder}), kFailure, {folder, "folder"});
+  expect_refused(run(scene, {"-o", folder}), kBadInput, {folder, "folder"});
   expect_refused(run(scene, {"-o", missing}), kFailure, {missing, "no folder"});
   EXPECT_EQ(folder_.names(), with_bundle);
 }
