@@ -134,58 +134,47 @@ void add_body(const ExportOptions& options, const std::string& name, TrajectoryR
   drawing.bodies.push_back({name.empty() ? surface.name : name, known->second, {}, std::move(motion)});
 }
 
-/// q of all frames of a kind's bodies, one body after the other.
-RowMatrix reduced_of(const Drawing& drawing, std::size_t kind) {
+/// Rows of all frames of a kind's bodies, one body after the other: of body i those of rows_of(i).
+template <typename RowsOf>
+RowMatrix stacked(const Drawing& drawing, std::size_t kind, Eigen::Index columns, const RowsOf& rows_of) {
   Eigen::Index rows = 0;
   for (const DrawnBody& body : drawing.bodies)
     if (body.motion && body.kind == kind) rows += body.motion->frames();
-  RowMatrix reduced(rows, drawing.kinds[kind].surface.mode_count());
+  RowMatrix all(rows, columns);
   rows = 0;
-  for (const DrawnBody& body : drawing.bodies) {
+  for (std::size_t i = 0; i < drawing.bodies.size(); ++i) {
+    const DrawnBody& body = drawing.bodies[i];
     if (!body.motion || body.kind != kind) continue;
-    reduced.middleRows(rows, body.motion->frames()) = body.motion->reduced;
+    all.middleRows(rows, body.motion->frames()) = rows_of(i);
     rows += body.motion->frames();
   }
-  return reduced;
+  return all;
 }
 
-/// Puts the principal components of a kind's motions in place of its modes, where a body of it was in full space.
-MorphError take_components(Drawing& drawing, std::size_t kind) {
+/// q of all frames of a kind's bodies. Where one of them was in full space, the principal components of their motions
+/// take the place of the modes.
+RowMatrix take_motions(Drawing& drawing, std::size_t kind, MorphError& beside) {
   DrawnSurface& surface = drawing.kinds[kind].surface;
-  Eigen::Index frames = 0;
+  const auto motion_of = [&](std::size_t body) -> const BodyMotion& { return *drawing.bodies[body].motion; };
   bool full = false;
-  MorphError beside;
   for (std::size_t i = 0; i < drawing.bodies.size(); ++i) {
     if (!drawing.bodies[i].motion || drawing.bodies[i].kind != kind) continue;
-    frames += drawing.bodies[i].motion->frames();
-    full = full || drawing.bodies[i].motion->full;
+    full = full || motion_of(i).full;
     beside.largest = std::max(beside.largest, drawing.motions[i].missed);
   }
-  if (!full) return beside;
-  Eigen::MatrixXd all(surface.modes.rows(), frames);
-  frames = 0;
-  for (std::size_t i = 0; i < drawing.bodies.size(); ++i) {
-    if (drawing.bodies[i].kind != kind) continue;
-    const BodyMotion& motion = *drawing.bodies[i].motion;
-    auto own = all.middleCols(frames, motion.frames());
-    if (motion.full)
-      own = std::exchange(drawing.motions[i].displacements, {});
-    else
-      own = surface.modes * motion.reduced.transpose();
-    frames += motion.frames();
-  }
+  if (!full)
+    return stacked(drawing, kind, surface.mode_count(),
+                   [&](std::size_t i) -> const RowMatrix& { return motion_of(i).reduced; });
+  const RowMatrix all = stacked(drawing, kind, surface.modes.rows(), [&](std::size_t i) -> RowMatrix {
+    if (motion_of(i).full) return std::exchange(drawing.motions[i].displacements, {});
+    return motion_of(i).reduced * surface.modes.transpose();
+  });
   MotionComponents components = components_of(all, kMotionTolerance * bounding_box_diagonal(surface.vertices));
   beside.largest += components.largest;
   beside.rms = components.rms;
   surface.modes = std::move(components.modes);
   surface.mode_name = "component";
-  frames = 0;
-  for (DrawnBody& body : drawing.bodies) {
-    if (body.kind != kind) continue;
-    body.motion->reduced = components.reduced.middleRows(frames, body.motion->frames());
-    frames += body.motion->frames();
-  }
-  return beside;
+  return std::move(components.reduced);
 }
 
 /// Morph targets of each kind for the motions of all its bodies, and the weights of each body.
@@ -193,12 +182,11 @@ void find_targets(const ExportOptions& options, Drawing& drawing) {
   std::vector<Eigen::Index> used(drawing.kinds.size(), 0);
   for (std::size_t i = 0; i < drawing.kinds.size(); ++i) {
     DrawnKind& kind = drawing.kinds[i];
-    drawing.beside.push_back(take_components(drawing, i));
+    drawing.reduced.push_back(take_motions(drawing, i, drawing.beside.emplace_back()));
     const Eigen::Index modes = kind.surface.mode_count();
     if (options.targets && *options.targets > modes)
       refuse_option(options, fmt::format("at most {} targets, as there are {}s", modes, kind.surface.mode_name),
                     fmt::format("{}", *options.targets));
-    drawing.reduced.push_back(reduced_of(drawing, i));
     const VertexNormals normals = normals_of(kind.surface);
     kind.normals = normals.at(kind.surface.vertices);
     kind.targets = drawing.bodies.front().motion

@@ -25,7 +25,7 @@ inline constexpr Eigen::Index kMostInfluences = 4;
 /// The skin of a render mesh that hangs on bones, by the largest kMostInfluences weights of each vertex.
 DrawnSkin read_drawn_skin(const RenderData& render, const SkeletonData& skeleton);
 
-/// Where bones are [7b: joint and turn from the bind pose, w first], as DrawnSkin::bind.
+/// The bones [7b: joint and turn from the bind pose, w first] as DrawnSkin::bind has them.
 std::vector<Eigen::Isometry3d> placed(const DrawnSkin& skin, const Eigen::VectorXd& bones);
 
 /// The transform that a vertex gets from bones that have moved by these, B A^-1.

@@ -16,7 +16,7 @@ namespace {
 constexpr double kFlat = 1e-3;     // determinant of a blend of bones below which it is not inverted
 constexpr double kDamping = 1e-3;  // of the squares of such a blend
 
-/// What takes a vertex in frame `frame` back to where it is drawn from.
+/// Takes a vertex in frame `frame` back to where it is drawn from.
 class Unposing {
  public:
   Unposing(const DrawnSurface& surface, const BodyMotion& motion, Eigen::Index frame) : surface_(surface) {
@@ -60,7 +60,7 @@ SurfaceMotion read_surface_motion(TrajectoryReader& trajectory, const DrawnSurfa
                       fmt::format("{} of {}", trajectory.samples(), trajectory.points()));
   const Eigen::Vector3d origin = trajectory.origin();
   SurfaceMotion found;
-  found.displacements.resize(3 * surface.vertex_count(), motion.frames());
+  found.displacements.resize(motion.frames(), 3 * surface.vertex_count());
   std::vector<float> positions;
   for (Eigen::Index frame = 0; frame < motion.frames(); ++frame) {
     trajectory.read_next(positions);
@@ -69,16 +69,16 @@ SurfaceMotion read_surface_motion(TrajectoryReader& trajectory, const DrawnSurfa
     const VertexArray drawn = (surface.of_vertices * all.cast<double>()).rowwise() + origin.transpose();
     const Unposing pose(surface, motion, frame);
     for (Eigen::Index v = 0; v < drawn.rows(); ++v)
-      found.displacements.col(frame).segment<3>(3 * v) = pose.displacement(v, drawn.row(v), found.missed);
+      found.displacements.row(frame).segment<3>(3 * v) = pose.displacement(v, drawn.row(v), found.missed);
   }
   trajectory.check_sum();
   return found;
 }
 
-MotionComponents components_of(const Eigen::MatrixXd& displacements, double tolerance) {
-  const Eigen::Index frames = displacements.cols();
-  const auto numbers = static_cast<double>(displacements.rows() / 3 * frames);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(displacements.transpose() * displacements);
+MotionComponents components_of(const RowMatrix& displacements, double tolerance) {
+  const Eigen::Index frames = displacements.rows();
+  const auto numbers = static_cast<double>(displacements.cols() / 3 * frames);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(displacements * displacements.transpose());
   Eigen::Index kept = frames;  // eigenvalues ascend
   double cut = 0;
   for (Eigen::Index k = 0; k + 1 < frames; ++k, --kept) {
@@ -89,12 +89,13 @@ MotionComponents components_of(const Eigen::MatrixXd& displacements, double tole
   const Eigen::VectorXd lengths = eigen.eigenvalues().tail(kept).reverse().cwiseMax(0).cwiseSqrt();
   MotionComponents found;
   found.reduced = vectors * lengths.asDiagonal();
-  found.modes = displacements * vectors;
+  found.modes = displacements.transpose() * vectors;
   for (Eigen::Index k = 0; k < kept; ++k)
     if (lengths[k] > 0) found.modes.col(k) /= lengths[k];
   double squares = 0;
   for (Eigen::Index frame = 0; frame < frames; ++frame) {
-    const Eigen::VectorXd missed = displacements.col(frame) - found.modes * found.reduced.row(frame).transpose();
+    const Eigen::VectorXd missed =
+        displacements.row(frame).transpose() - found.modes * found.reduced.row(frame).transpose();
     squares += missed.squaredNorm();
     found.largest = std::max(found.largest, missed.reshaped(3, missed.size() / 3).colwise().norm().maxCoeff());
   }

@@ -11,8 +11,8 @@ namespace exmat::runtime {
 
 /// Motion of the vertices of a drawn surface as a trajectory holds it.
 struct SurfaceMotion {
-  Eigen::MatrixXd displacements;  ///< 3v x F from rest in the body's frame or, with a skin, before it [m]
-  double missed = 0;              ///< by as much does one miss a position, where bones cancel each other out [m]
+  RowMatrix displacements;  ///< F x 3v, from rest in the body's frame or, with a skin, before it [m]
+  double missed = 0;        ///< by as much does one miss a position, where bones cancel each other out [m]
 };
 
 /// By the positions of the object's vertices, of the body that is selected. Throws InputError.
@@ -24,6 +24,6 @@ struct MotionComponents {
   RowMatrix reduced;            ///< F x N [m]
   double largest = 0, rms = 0;  ///< what they miss of a vertex [m]
 };
-MotionComponents components_of(const Eigen::MatrixXd& displacements, double tolerance);
+MotionComponents components_of(const RowMatrix& displacements, double tolerance);
 
 }  // namespace exmat::runtime

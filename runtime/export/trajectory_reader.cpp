@@ -62,32 +62,29 @@ void TrajectoryReader::select(const std::string& body) {
   positions_.clear();
 }
 
-std::string TrajectoryReader::text(const std::string& attribute) const {
+template <typename Value>
+std::optional<Value> TrajectoryReader::attribute(const std::string& name, const char* expected) const {
   const std::string object = group_.empty() ? "/" : group_;
-  if (!file_.has_attribute(object, attribute)) return {};
-  const AttributeValue value = file_.read_attribute(object, attribute);
-  const auto* text = std::get_if<std::string>(&value);
-  if (text == nullptr) refuse(group_ + "/@" + attribute, "a string", "another type");
-  return *text;
+  if (!file_.has_attribute(object, name)) return std::nullopt;
+  AttributeValue value = file_.read_attribute(object, name);
+  auto* const held = std::get_if<Value>(&value);
+  if (held == nullptr) refuse(group_ + "/@" + name, expected, "another type");
+  return std::move(*held);
 }
 
-std::int64_t TrajectoryReader::integer(const std::string& attribute) const {
-  const std::string object = group_.empty() ? "/" : group_;
-  if (!file_.has_attribute(object, attribute)) return 0;
-  const AttributeValue value = file_.read_attribute(object, attribute);
-  const auto* number = std::get_if<std::int64_t>(&value);
-  if (number == nullptr) refuse(group_ + "/@" + attribute, "a whole number", "another type");
-  return *number;
+std::string TrajectoryReader::text(const std::string& attribute_name) const {
+  return attribute<std::string>(attribute_name, "a string").value_or("");
+}
+
+std::int64_t TrajectoryReader::integer(const std::string& attribute_name) const {
+  return attribute<std::int64_t>(attribute_name, "a whole number").value_or(0);
 }
 
 Eigen::Vector3d TrajectoryReader::origin() const {
-  const std::string object = group_.empty() ? "/" : group_;
-  if (!file_.has_attribute(object, "origin")) return Eigen::Vector3d::Zero();  // of a format before 6
-  const AttributeValue value = file_.read_attribute(object, "origin");
-  const auto* numbers = std::get_if<std::vector<double>>(&value);
-  const bool sound =
-      numbers != nullptr && numbers->size() == 3 && Eigen::Map<const Eigen::Vector3d>(numbers->data()).allFinite();
-  if (!sound) refuse(group_ + "/@origin", "three finite numbers", "others");
+  const auto numbers = attribute<std::vector<double>>("origin", "three finite numbers");
+  if (!numbers) return Eigen::Vector3d::Zero();  // of a format before 6
+  if (numbers->size() != 3 || !Eigen::Map<const Eigen::Vector3d>(numbers->data()).allFinite())
+    refuse(group_ + "/@origin", "three finite numbers", "others");
   return Eigen::Vector3d(numbers->data());
 }
 

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,9 +26,9 @@ class TrajectoryReader {
   const std::string& name() const { return file_.name(); }
   bool has(const std::string& dataset) const { return file_.has_dataset(group_ + dataset); }
   /// An attribute of the run, or of the body; empty where the trajectory is older than it.
-  std::string text(const std::string& attribute) const;
+  std::string text(const std::string& attribute_name) const;
   /// Likewise a whole number; 0 where the trajectory is older than it.
-  std::int64_t integer(const std::string& attribute) const;
+  std::int64_t integer(const std::string& attribute_name) const;
   /// Point that positions are measured from [m].
   Eigen::Vector3d origin() const;
   /// All rows of a dataset of numbers, F x the numbers of each.
@@ -49,6 +50,9 @@ class TrajectoryReader {
                            const std::string& advice = "") const;
 
  private:
+  /// That of the run or of the body; nothing where it has none. Refuses another type.
+  template <typename Value>
+  std::optional<Value> attribute(const std::string& name, const char* expected) const;
   Hdf5Dataset open_dataset(const std::string& path);
   void check_sum(const Hdf5Dataset& dataset, std::uint32_t crc) const;
   template <typename Array>

@@ -66,7 +66,7 @@ BodyFrames::BodyFrames(Hdf5File& file, std::string group, const NamedBody& body,
       rest_masses_(tet_volumes(model_.object->mesh).cwiseProduct(model_.object->materials.density)),
       displacements_(model_.object->mesh.vertex_count(), 3),
       velocities_(model_.object->mesh.vertex_count(), 3) {
-  write_run(file, group_.empty() ? "/" : group_, model_, info_);
+  write_run(file, owner(), model_, info_);
   const SymbolSizes sizes = sizes_of(model_, info_);
   write_body_groups(file, group_, sizes, info_.weights);
   const auto write = [&](const char* name, const auto& array) {
@@ -144,8 +144,7 @@ void BodyFrames::append_positions(const State& state) {
   set_positions(state, positions);
   if (!origin_) origin_ = origin_near(positions);
   if (times_.size() == 1)
-    file_.write_attribute(group_.empty() ? "/" : group_, "origin",
-                          std::vector<double>(origin_->data(), origin_->data() + 3));
+    file_.write_attribute(owner(), "origin", std::vector<double>(origin_->data(), origin_->data() + 3));
   datasets_->append_drawn(times_.back(), positions, *origin_, datasets_->positions);
   if (model_.render) append_render_mesh(positions);
   largest_displacement_ = std::max(largest_displacement_, displacements_.rowwise().norm().maxCoeff());
@@ -169,7 +168,7 @@ void BodyFrames::append_render_mesh(const VertexArray& positions) {
 }
 
 void BodyFrames::finish() {
-  file_.write_attribute(group_.empty() ? "/" : group_, "full_frames", full_frames_);
+  file_.write_attribute(owner(), "full_frames", full_frames_);
   datasets_->finish();
   datasets_.reset();
 }

@@ -61,6 +61,7 @@ class BodyFrames {
   double largest_displacement() const { return largest_displacement_; }
 
  private:
+  std::string owner() const { return group_.empty() ? "/" : group_; }  ///< of the attributes of the run
   void append_positions(const State& state);
   void set_positions(const State& state, VertexArray& positions);
   void append_render_mesh(const VertexArray& positions);

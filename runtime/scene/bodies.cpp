@@ -136,13 +136,11 @@ void Bodies::require_finite() const {
     const State& state = world_.state(i);
     const std::string& name = loaded_.bodies[static_cast<std::size_t>(i)].name;
     throw WorkError(fmt::format(
-        "{}: step {} (t = {:g} s), body {}: {} (now {:g} s), "
+        "{}: step {} (t = {:g} s), body {}: the state is no longer finite; try a {} time_step (now {:g} s), "
         "smaller loads, contact or example stiffness, or the integrator backward_euler. No trajectory was written",
         config_.file.string(), state.step + 1, state.time + config_.time_step,
         name.empty() ? fmt::format("{} of {}", i + 1, count()) : name,
-        config_.time_step < kShortStep ? "the state is no longer finite; try a larger time_step"
-                                       : "the state is no longer finite; try a smaller time_step",
-        config_.time_step));
+        config_.time_step < kShortStep ? "larger" : "smaller", config_.time_step));
   }
 }
 

@@ -8,6 +8,10 @@ from pathlib import Path
 import numpy as np
 
 
+FLOAT, UBYTE, USHORT, UINT = 5126, 5121, 5123, 5125
+KINDS = {FLOAT: np.float32, UBYTE: np.uint8, USHORT: np.uint16, UINT: np.uint32}
+
+
 def bar():
     """Text of a .veg file: 8 x 2 x 2 cubes of six tets each, 4 m long; and the vertices at x = 0, 0-based."""
     number = {place: k + 1 for k, place in enumerate(itertools.product(range(9), range(3), range(3)))}
@@ -38,51 +42,69 @@ def tube(length=3.0, steps=24, around=16):
     return points, np.array(triangles)
 
 
+class Glb:
+    """A .glb that is made: its JSON, and arrays that become accessors."""
+
+    def __init__(self):
+        self.json = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "accessors": [], "bufferViews": []}
+        self.binary = bytearray()
+
+    def view(self, data):
+        self.json["bufferViews"].append({"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data)})
+        self.binary += data + b"\0" * (-len(data) % 4)
+        return len(self.json["bufferViews"]) - 1
+
+    def accessor(self, array, code, kind, **more):
+        array = np.ascontiguousarray(array, KINDS[code])
+        self.json["accessors"].append({"bufferView": self.view(array.tobytes()), "componentType": code, "count": len(array), "type": kind, **more})
+        return len(self.json["accessors"]) - 1
+
+    def floats(self, array, kind):
+        return self.accessor(array, FLOAT, kind)
+
+    def positions(self, points):
+        points = np.asarray(points, np.float32)
+        return self.accessor(points, FLOAT, "VEC3", min=points.min(0).tolist(), max=points.max(0).tolist())
+
+    def write(self, path):
+        document = {**self.json, "buffers": [{"byteLength": len(self.binary)}]}
+        text = json.dumps(document).encode()
+        text += b" " * (-len(text) % 4)
+        path.write_bytes(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(self.binary)) + struct.pack("<I4s", len(text), b"JSON") + text
+                         + struct.pack("<I4s", len(self.binary), b"BIN\0") + bytes(self.binary))
+
+
 def write_skinned(path, bulge=0.0):
     """A .glb of a tube on three bones of 1 m in a row, whose weights go over within 0.3 m; an animation turns each by 30 degrees about z,
     and back. A morph target bulges the middle."""
     points, triangles = tube()
     bones = 3
-    document = {"asset": {"version": "2.0"}, "scene": 0, "accessors": [], "bufferViews": []}
-    binary = bytearray()
-
-    def accessor(array, kind, code):
-        document["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": array.nbytes})
-        binary.extend(array.tobytes())
-        binary.extend(b"\0" * (-len(binary) % 4))
-        document["accessors"].append({"bufferView": len(document["bufferViews"]) - 1, "componentType": code, "count": len(array),
-                                      "type": kind})
-        return len(document["accessors"]) - 1
-
-    floats = lambda array, kind: accessor(np.ascontiguousarray(array, np.float32), kind, 5126)
+    glb = Glb()
     bone = np.clip(points[:, 0].astype(int), 0, bones - 1)
     to_next = np.where(bone < bones - 1, np.clip((points[:, 0] - bone - 0.7) / 0.3, 0, 1) / 2, 0)
     to_last = np.where(bone > 0, np.clip((0.3 - (points[:, 0] - bone)) / 0.3, 0, 1) / 2, 0)
-    joints = np.stack([bone, np.minimum(bone + 1, bones - 1), np.maximum(bone - 1, 0), bone], 1).astype(np.uint8)
+    joints = np.stack([bone, np.minimum(bone + 1, bones - 1), np.maximum(bone - 1, 0), bone], 1)
     weights = np.stack([1 - to_next - to_last, to_next, to_last, 0 * to_last], 1)
-    document["meshes"] = [{"primitives": [{
-        "attributes": {"POSITION": floats(points, "VEC3"), "JOINTS_0": accessor(joints, "VEC4", 5121), "WEIGHTS_0": floats(weights, "VEC4")},
-        "indices": accessor(np.ascontiguousarray(triangles.ravel(), np.uint32), "SCALAR", 5125)}]}]
+    mesh = {"primitives": [{
+        "attributes": {"POSITION": glb.positions(points), "JOINTS_0": glb.accessor(joints, UBYTE, "VEC4"), "WEIGHTS_0": glb.floats(weights, "VEC4")},
+        "indices": glb.accessor(triangles.ravel(), UINT, "SCALAR")}]}
     if bulge:
         out = bulge * np.exp(-((points[:, 0] - 1.5) / 0.3) ** 2)[:, None] * points * [0, 1, 1]
-        document["meshes"][0]["primitives"][0]["targets"] = [{"POSITION": floats(out, "VEC3")}]
-        document["meshes"][0]["extras"] = {"targetNames": ["flex"]}
+        mesh["primitives"][0]["targets"] = [{"POSITION": glb.positions(out)}]
+        mesh["extras"] = {"targetNames": ["flex"]}
     inverse = np.tile(np.eye(4), (bones, 1, 1))
     inverse[:, 0, 3] = -np.arange(bones)
-    document["skins"] = [{"joints": [1, 2, 3], "inverseBindMatrices": floats(inverse.transpose(0, 2, 1).reshape(-1, 16), "MAT4")}]
-    document["nodes"] = [{"mesh": 0, "skin": 0}, {"name": "root", "children": [2]},
-                         {"name": "middle", "translation": [1, 0, 0], "children": [3]}, {"name": "tip", "translation": [1, 0, 0]}]
-    document["scenes"] = [{"nodes": [0, 1]}]
     half = np.radians(30) / 2
-    times = floats(np.array([0, 0.5, 1.0]), "SCALAR")
-    turns = floats(np.array([[0, 0, 0, 1], [0, 0, np.sin(half), np.cos(half)], [0, 0, 0, 1]]), "VEC4")
-    document["animations"] = [{"name": "curl", "samplers": [{"input": times, "output": turns}],
-                               "channels": [{"sampler": 0, "target": {"node": node, "path": "rotation"}} for node in (1, 2, 3)]}]
-    document["buffers"] = [{"byteLength": len(binary)}]
-    text = json.dumps(document).encode()
-    text += b" " * (-len(text) % 4)
-    path.write_bytes(struct.pack("<III", 0x46546C67, 2, 28 + len(text) + len(binary)) + struct.pack("<II", len(text), 0x4E4F534A) + text
-                     + struct.pack("<II", len(binary), 0x004E4942) + bytes(binary))
+    times = glb.floats(np.array([0, 0.5, 1.0]), "SCALAR")
+    turns = glb.floats(np.array([[0, 0, 0, 1], [0, 0, np.sin(half), np.cos(half)], [0, 0, 0, 1]]), "VEC4")
+    glb.json |= {
+        "meshes": [mesh], "scenes": [{"nodes": [0, 1]}],
+        "skins": [{"joints": [1, 2, 3], "inverseBindMatrices": glb.floats(inverse.transpose(0, 2, 1).reshape(-1, 16), "MAT4")}],
+        "nodes": [{"mesh": 0, "skin": 0}, {"name": "root", "children": [2]}, {"name": "middle", "translation": [1, 0, 0], "children": [3]},
+                  {"name": "tip", "translation": [1, 0, 0]}],
+        "animations": [{"name": "curl", "samplers": [{"input": times, "output": turns}],
+                        "channels": [{"sampler": 0, "target": {"node": node, "path": "rotation"}} for node in (1, 2, 3)]}]}
+    glb.write(path)
 
 
 def write_bar(folder):

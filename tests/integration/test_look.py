@@ -18,14 +18,12 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from programs import call, write_bar, write_json
+from programs import FLOAT, KINDS, UBYTE, UINT, USHORT, Glb, call, write_bar, write_json
 
 PROGRAMS = Path(sys.argv.pop(1)).resolve()
 KEPT = Path(sys.argv.pop()) if "--keep" in sys.argv else None
 sys.argv = sys.argv[:1]
 PRECOMPUTE, RUNTIME = PROGRAMS / "exmat-precompute", PROGRAMS / "exmat-runtime"
-FLOAT, UBYTE, USHORT, UINT = 5126, 5121, 5123, 5125
-KINDS = {FLOAT: np.float32, UBYTE: np.uint8, USHORT: np.uint16, UINT: np.uint32}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 TURN = np.array([0, 0, np.sin(0.3), np.cos(0.3)])
 
@@ -42,35 +40,6 @@ def rotation(q):
     return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
                      [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
                      [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
-
-
-class Glb:
-    """A .glb that is made."""
-
-    def __init__(self):
-        self.json = {"asset": {"version": "2.0", "copyright": "2026 an artist"}, "scene": 0, "scenes": [{"nodes": [0]}], "accessors": [], "bufferViews": []}
-        self.binary = bytearray()
-
-    def view(self, data):
-        self.json["bufferViews"].append({"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data)})
-        self.binary += data + b"\0" * (-len(data) % 4)
-        return len(self.json["bufferViews"]) - 1
-
-    def accessor(self, array, code, kind, **more):
-        array = np.ascontiguousarray(array, KINDS[code])
-        self.json["accessors"].append({"bufferView": self.view(array.tobytes()), "componentType": code, "count": len(array), "type": kind, **more})
-        return len(self.json["accessors"]) - 1
-
-    def positions(self, points):
-        points = np.asarray(points, np.float32)
-        return self.accessor(points, FLOAT, "VEC3", min=points.min(0).tolist(), max=points.max(0).tolist())
-
-    def write(self, path):
-        document = {**self.json, "buffers": [{"byteLength": len(self.binary)}]}
-        text = json.dumps(document).encode()
-        text += b" " * (-len(text) % 4)
-        path.write_bytes(struct.pack("<4sII", b"glTF", 2, 28 + len(text) + len(self.binary)) + struct.pack("<I4s", len(text), b"JSON") + text
-                         + struct.pack("<I4s", len(self.binary), b"BIN\0") + bytes(self.binary))
 
 
 class Document:
@@ -154,6 +123,7 @@ def artists_glb(path, colour=(200, 10, 10)):
     """Two nodes with one mesh, one of them mirrored, below a node with another, which has two materials."""
     points, uv, out, triangles = tube()
     glb = Glb()
+    glb.json["asset"]["copyright"] = "2026 an artist"
     # The surface stands in the scene after a turn, a scale and a shift of its node.
     local = (points - [1, 0, 0]) @ rotation(TURN) / 2
     attributes = {"POSITION": glb.positions(local), "NORMAL": glb.accessor(out @ rotation(TURN), FLOAT, "VEC3"),

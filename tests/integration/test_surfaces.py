@@ -16,7 +16,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from programs import tube
+from programs import UINT, Glb, tube
 
 PROGRAMS = Path(sys.argv.pop(1)).resolve()
 PRECOMPUTE = PROGRAMS / "exmat-precompute"
@@ -38,38 +38,26 @@ def twisted(points, degrees):
 
 def write_glb(path, points, triangles, morphs=None, attributes=None, materials=None, colours=None, node=None):
     """`materials`: name -> rows of the triangles, a primitive each. `morphs`: name -> points."""
-    document = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0, "name": "tube", **(node or {})}],
-                "meshes": [{"name": "tube mesh", "primitives": []}], "accessors": [], "bufferViews": [], "buffers": [{}]}
-    binary = bytearray()
-
-    def accessor(array, kind, code):
-        document["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": array.nbytes})
-        binary.extend(array.tobytes())
-        document["accessors"].append({"bufferView": len(document["bufferViews"]) - 1, "componentType": code, "count": len(array), "type": kind})
-        return len(document["accessors"]) - 1
-
-    floats = lambda array: np.ascontiguousarray(array, np.float32)
-    named = {"POSITION": accessor(floats(points), "VEC3", 5126)}
+    glb = Glb()
+    mesh = {"name": "tube mesh", "primitives": []}
+    glb.json |= {"nodes": [{"mesh": 0, "name": "tube", **(node or {})}], "meshes": [mesh]}
+    named = {"POSITION": glb.floats(points, "VEC3")}
     for name, values in (attributes or {}).items():
-        named[name] = accessor(floats(values), "SCALAR", 5126)
+        named[name] = glb.floats(values, "SCALAR")
     if colours is not None:
-        named["COLOR_0"] = accessor(floats(colours), "VEC3", 5126)
-    targets = [{"POSITION": accessor(floats(posed - points), "VEC3", 5126)} for posed in (morphs or {}).values()]
+        named["COLOR_0"] = glb.floats(colours, "VEC3")
+    targets = [{"POSITION": glb.floats(posed - points, "VEC3")} for posed in (morphs or {}).values()]
     if morphs:
-        document["meshes"][0]["extras"] = {"targetNames": list(morphs)}
+        mesh["extras"] = {"targetNames": list(morphs)}
     for name, rows in (materials or {None: slice(None)}).items():
-        primitive = {"attributes": named, "indices": accessor(np.ascontiguousarray(triangles[rows].ravel(), np.uint32), "SCALAR", 5125)}
+        primitive = {"attributes": named, "indices": glb.accessor(triangles[rows].ravel(), UINT, "SCALAR")}
         if morphs:
             primitive["targets"] = targets
         if name:
-            document.setdefault("materials", []).append({"name": name})
-            primitive["material"] = len(document["materials"]) - 1
-        document["meshes"][0]["primitives"].append(primitive)
-    document["buffers"][0]["byteLength"] = len(binary)
-    text = json.dumps(document).encode()
-    text += b" " * (-len(text) % 4)
-    path.write_bytes(struct.pack("<III", 0x46546C67, 2, 28 + len(text) + len(binary)) + struct.pack("<II", len(text), 0x4E4F534A) + text
-                     + struct.pack("<II", len(binary), 0x004E4942) + bytes(binary))
+            glb.json.setdefault("materials", []).append({"name": name})
+            primitive["material"] = len(glb.json["materials"]) - 1
+        mesh["primitives"].append(primitive)
+    glb.write(path)
 
 
 def write_obj(path, points, triangles):

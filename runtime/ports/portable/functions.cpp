@@ -5,6 +5,8 @@
 
 namespace {
 
+constexpr double kLostOfPi = 1.2246467991473532e-16;  // pi less its double
+
 /// The sum of the first `terms` of (-square)^n / ((first + 1) (first + 2) ... (first + 2 n)).
 double turns(double square, int first, int terms) {
   double sum = 1;
@@ -31,7 +33,7 @@ Turn without_quarters(double angle) {
 
 double sine(double x) { return x - x * (x * x / 6 * turns(x * x, 3, 8)); }
 double cosine(double x) {
-  // What the rounding of 1 - x^2/2 lost is added to the rest.
+  // The rest takes what the rounding of 1 - x^2/2 lost.
   const double half = 0.5 * x * x, first = 1 - half;
   return first + (((1 - first) - half) + half * (x * x) / 12 * turns(x * x, 4, 8));
 }
@@ -48,8 +50,7 @@ double first_octant(double y, double x) {
   const bool is_steep = y > 0.4142135623730951 * x;
   const double t = is_steep ? (y - x) / (y + x) : y / x;
   const double less = t * (t * t) * odd_series(-t * t, 20);
-  constexpr double kLost = 3.061616997868383e-17;  // pi / 4 less its double
-  return is_steep ? std::numbers::pi / 4 + (t - (less - kLost)) : t - less;
+  return is_steep ? std::numbers::pi / 4 + (t - (less - kLostOfPi / 4)) : t - less;
 }
 
 /// log(x + lost), x > 0 and finite.
@@ -92,10 +93,10 @@ double exmat_portable_atan2(double y, double x) {
     return exmat_portable_atan2(std::copysign(std::isinf(y) || !std::isinf(x) ? std::isinf(y) : 0.0, y),
                                 std::copysign(std::isinf(x) || !std::isinf(y) ? 1.0 : 0.0, x));
   }
-  constexpr double kLost = 6.123233995736766e-17;  // pi / 2 less its double
-  if (up > along) return std::copysign(std::numbers::pi / 2 - (std::copysign(first_octant(along, up), x) - kLost), y);
+  if (up > along)
+    return std::copysign(std::numbers::pi / 2 - (std::copysign(first_octant(along, up), x) - kLostOfPi / 2), y);
   const double angle = first_octant(up, along);
-  return std::copysign(std::signbit(x) ? std::numbers::pi - (angle - 2 * kLost) : angle, y);
+  return std::copysign(std::signbit(x) ? std::numbers::pi - (angle - kLostOfPi) : angle, y);
 }
 
 double exmat_portable_acos(double x) { return exmat_portable_atan2(std::sqrt((1 - x) * (1 + x)), x); }

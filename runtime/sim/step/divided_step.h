@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <optional>
 
 #include "runtime/sim/solver/newton.h"
@@ -43,19 +42,19 @@ class DividedStep {
   int parts_ = 1;
 };
 
-/// A step is tried in so many parts.
-inline constexpr std::array kStepParts{4, 16};
+/// A step is tried in the fewest parts, then in so many times as many, up to the most.
+inline constexpr int kFewestStepParts = 4, kMostStepParts = 16;
 
 /// Calls begin(parts), then take(part) of each, which returns its StepStatus: in as few parts as have solutions, in the
 /// most where none have. False after begin(1) where numbers do not stay finite in these.
 template <class Begin, class Take>
 bool take_in_parts(const Begin& begin, const Take& take) {
-  for (const int parts : kStepParts) {
+  for (int parts = kFewestStepParts; parts <= kMostStepParts; parts *= kFewestStepParts) {
     begin(parts);
     std::uint32_t status = 0;
     for (int part = 0; part < parts && (status & kStepNonFinite) == 0; ++part) status |= take(part);
     if ((status & kStepNonFinite) != 0) continue;
-    if ((status & kStepUnconverged) == 0 || parts == kStepParts.back()) return true;
+    if ((status & kStepUnconverged) == 0 || parts == kMostStepParts) return true;
   }
   begin(1);
   return false;
