@@ -1,6 +1,6 @@
 #include "common/elastic/material.h"
 
-#include <Eigen/Eigenvalues>
+#include "common/core/decompositions.h"
 
 namespace exmat {
 

@@ -1,9 +1,9 @@
 #include "common/elastic/principal_tangent.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <cmath>
+
+#include "common/core/decompositions.h"
 
 namespace exmat {
 namespace {

@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/geometry.h"
 
 namespace exmat {

@@ -1,6 +1,5 @@
 #include "common/mesh/surface_check.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -8,6 +7,7 @@
 #include <tuple>
 #include <utility>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/geometry.h"
 
 namespace exmat {

@@ -1,8 +1,8 @@
 #include "precompute/alignment/aligned_shape.h"
 
-#include <Eigen/SVD>
 #include <algorithm>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/geometry.h"
 
 namespace exmat::precompute {

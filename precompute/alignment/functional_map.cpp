@@ -1,10 +1,9 @@
 #include "precompute/alignment/functional_map.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/farthest_points.h"
 
 namespace exmat::precompute {

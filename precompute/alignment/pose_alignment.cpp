@@ -1,12 +1,12 @@
 #include "precompute/alignment/pose_alignment.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <optional>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/geometry.h"
 #include "common/mesh/nearest_point.h"
 #include "precompute/alignment/landmark_check.h"

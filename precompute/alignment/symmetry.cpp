@@ -1,11 +1,11 @@
 #include "precompute/alignment/symmetry.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/farthest_points.h"
 #include "precompute/shape_space/transfer.h"
 

@@ -1,12 +1,12 @@
 #include "precompute/cubature/cubature.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <numeric>
 #include <random>
 
+#include "common/core/decompositions.h"
 #include "common/core/error.h"
 #include "common/core/progress.h"
 #include "precompute/cubature/element_samples.h"

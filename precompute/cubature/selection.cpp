@@ -1,6 +1,5 @@
 #include "precompute/cubature/selection.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,6 +8,7 @@
 #include <random>
 #include <set>
 
+#include "common/core/decompositions.h"
 #include "common/core/progress.h"
 
 namespace exmat::precompute {

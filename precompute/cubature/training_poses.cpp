@@ -1,12 +1,13 @@
 #include "precompute/cubature/training_poses.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <random>
 #include <utility>
 #include <vector>
+
+#include "common/core/decompositions.h"
 
 namespace exmat::precompute {
 namespace {

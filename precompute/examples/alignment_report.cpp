@@ -1,6 +1,5 @@
 #include "precompute/examples/alignment_report.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cctype>
@@ -9,6 +8,7 @@
 
 #include "common/core/atomic_file.h"
 #include "common/core/command_files.h"
+#include "common/core/decompositions.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
 #include "common/core/markup.h"

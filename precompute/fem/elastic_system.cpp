@@ -1,10 +1,9 @@
 #include "precompute/fem/elastic_system.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <utility>
 
+#include "common/core/decompositions.h"
 #include "common/core/error.h"
 
 namespace exmat::precompute {

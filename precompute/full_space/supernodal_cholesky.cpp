@@ -1,9 +1,10 @@
 #include "precompute/full_space/supernodal_cholesky.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/OrderingMethods>
 #include <algorithm>
 #include <utility>
+
+#include "common/core/decompositions.h"
 
 namespace exmat::precompute {
 namespace {

@@ -1,13 +1,12 @@
 #include "precompute/modes/basis.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
 
 #include "common/config/asset_config.h"
+#include "common/core/decompositions.h"
 #include "common/core/error.h"
 
 namespace exmat::precompute {
@@ -43,12 +42,12 @@ Eigen::MatrixXd principal_components(const SparseMatrix& mass, const Eigen::Matr
   if (columns.cols() > columns.rows()) {  // of a small mesh: the smaller of the two matrices of products
     const Eigen::LLT<Eigen::MatrixXd> factor{Eigen::MatrixXd(mass)};
     const Eigen::MatrixXd scaled = factor.matrixU() * columns;
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> products(scaled * scaled.transpose());
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> products(Eigen::MatrixXd(scaled * scaled.transpose()));
     const Eigen::VectorXd values = products.eigenvalues().reverse();
     const Eigen::Index rank = (values.array() > kRankTolerance * kRankTolerance * values[0]).count();
     return factor.matrixU().solve(products.eigenvectors().rowwise().reverse().leftCols(std::min(size, rank)));
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(columns.transpose() * (mass * columns));
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(Eigen::MatrixXd(columns.transpose() * (mass * columns)));
   const Eigen::VectorXd values = gram.eigenvalues().reverse();
   const double smallest = kRankTolerance * kRankTolerance * values[0];
   const Eigen::Index rank = (values.array() > smallest).count();

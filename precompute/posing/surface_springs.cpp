@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/farthest_points.h"
 #include "precompute/alignment/kd_tree.h"
 

@@ -1,7 +1,8 @@
 #include "precompute/shape_space/projection.h"
 
-#include <Eigen/SVD>
 #include <cmath>
+
+#include "common/core/decompositions.h"
 
 namespace exmat::precompute {
 namespace {

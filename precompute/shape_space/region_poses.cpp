@@ -1,7 +1,8 @@
 #include "precompute/shape_space/region_poses.h"
 
-#include <Eigen/Cholesky>
 #include <cmath>
+
+#include "common/core/decompositions.h"
 
 namespace exmat::precompute {
 

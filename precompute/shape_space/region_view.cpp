@@ -1,9 +1,9 @@
 #include "precompute/shape_space/region_view.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/QR>
 #include <utility>
 
+#include "common/core/decompositions.h"
 #include "precompute/shape_space/region_window.h"
 
 namespace exmat::precompute {

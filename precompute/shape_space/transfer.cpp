@@ -1,10 +1,10 @@
 #include "precompute/shape_space/transfer.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/nearest_point.h"
 
 namespace exmat::precompute {

@@ -1,12 +1,12 @@
 #include "precompute/solvers/davidson.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <limits>
 #include <random>
 #include <string>
 #include <vector>
 
+#include "common/core/decompositions.h"
 #include "common/core/error.h"
 #include "common/core/progress.h"
 #include "precompute/solvers/tall.h"
@@ -78,7 +78,8 @@ RowMatrix Davidson::start() const {
 void Davidson::make_independent(RowMatrix& columns) const {
   const Eigen::MatrixXd gram = inner(columns, product(mass_, columns));
   const Eigen::VectorXd scale = gram.diagonal().cwiseMax(std::numeric_limits<double>::min()).cwiseSqrt().cwiseInverse();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> unit(scale.asDiagonal() * gram * scale.asDiagonal());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> unit(
+      Eigen::MatrixXd(scale.asDiagonal() * gram * scale.asDiagonal()));
   const Eigen::VectorXd& values = unit.eigenvalues();
   const Eigen::Index kept = (values.array() > kIndependent * values.maxCoeff()).count();
   const Eigen::MatrixXd turn = scale.asDiagonal() * unit.eigenvectors().rightCols(kept) *
@@ -116,7 +117,7 @@ Eigen::MatrixXd Davidson::solve() {
   extend(start());
   double nearest = std::numeric_limits<double>::infinity();
   for (int step = 0, waited = 0; step < kMostExpansions; ++step) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ritz(projected_.topLeftCorner(size_, size_));
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ritz(Eigen::MatrixXd(projected_.topLeftCorner(size_, size_)));
     const Eigen::Index pairs = std::min(pairs_, size_);
     RowMatrix vectors = RowMatrix::Zero(space_.rows(), pairs);
     add_product(1, own(), ritz.eigenvectors().leftCols(pairs), vectors);

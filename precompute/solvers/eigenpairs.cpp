@@ -1,6 +1,5 @@
 #include "precompute/solvers/eigenpairs.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/core/decompositions.h"
 #include "common/core/error.h"
 #include "common/core/progress.h"
 #include "precompute/solvers/davidson.h"

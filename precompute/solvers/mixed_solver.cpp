@@ -1,11 +1,11 @@
 #include "precompute/solvers/mixed_solver.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <random>
 #include <utility>
 #include <vector>
 
+#include "common/core/decompositions.h"
 #include "common/core/error.h"
 #include "precompute/solvers/tall.h"
 

@@ -1,9 +1,10 @@
 #include "precompute/solvers/refinement.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+
+#include "common/core/decompositions.h"
 
 namespace exmat::precompute {
 namespace {

@@ -1,6 +1,5 @@
 #include "precompute/solvers/semidefinite_solver.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <array>
 #include <cstdio>
@@ -9,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/core/decompositions.h"
 #include "common/core/log.h"
 #include "precompute/solvers/available_memory.h"
 #include "precompute/solvers/blas.h"

@@ -1,12 +1,12 @@
 #include "precompute/solvers/single_cholesky.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <atomic>
 #include <functional>
 #include <omp.h>
 #include <utility>
 
+#include "common/core/decompositions.h"
 #include "precompute/solvers/blas.h"
 #include "precompute/solvers/dissection.h"
 

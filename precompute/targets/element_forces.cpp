@@ -1,10 +1,10 @@
 #include "precompute/targets/element_forces.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <utility>
 
+#include "common/core/decompositions.h"
 #include "runtime/sim/elasticity/element_potential.h"
 
 namespace exmat::precompute {

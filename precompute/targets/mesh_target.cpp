@@ -1,10 +1,10 @@
 #include "precompute/targets/mesh_target.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <string>
 
+#include "common/core/decompositions.h"
 #include "common/core/error.h"
 #include "precompute/cubature/element_samples.h"
 #include "precompute/targets/element_forces.h"
@@ -44,7 +44,7 @@ void build_solver(const ObjectData& object, const ElementSamples& samples, const
 
 PoseCoordinates pose_range(const SparseMatrix& mass, const Eigen::MatrixXd& fields, const Eigen::MatrixXd& changes) {
   const Eigen::MatrixXd mass_fields = mass * fields;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(fields.transpose() * mass_fields);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(Eigen::MatrixXd(fields.transpose() * mass_fields));
   const Eigen::VectorXd& values = gram.eigenvalues();
   const Eigen::Index rank = (values.array() > kRank * values.tail(1)[0]).count();
   const Eigen::MatrixXd directions =

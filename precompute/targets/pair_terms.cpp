@@ -1,11 +1,11 @@
 #include "precompute/targets/pair_terms.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <fmt/format.h>
 #include <utility>
 #include <vector>
 
+#include "common/core/decompositions.h"
 #include "precompute/targets/simplex_points.h"
 #include "precompute/targets/table_error.h"
 #include "runtime/sim/examples/bernstein_basis.h"

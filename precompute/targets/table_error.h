@@ -1,9 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/QR>
 
 #include "common/core/arrays.h"
+#include "common/core/decompositions.h"
 #include "runtime/sim/examples/target.h"
 #include "runtime/sim/examples/target_table.h"
 

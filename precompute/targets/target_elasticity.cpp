@@ -1,11 +1,11 @@
 #include "precompute/targets/target_elasticity.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <random>
 
+#include "common/core/decompositions.h"
 #include "common/elastic/materials.h"
 #include "precompute/cubature/element_samples.h"
 #include "precompute/cubature/selection.h"

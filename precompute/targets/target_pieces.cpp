@@ -1,12 +1,11 @@
 #include "precompute/targets/target_pieces.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
 
+#include "common/core/decompositions.h"
 #include "precompute/targets/simplex_points.h"
 
 namespace exmat::precompute {

@@ -1,11 +1,10 @@
 #include "precompute/targets/target_space.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <fmt/format.h>
 #include <utility>
 
+#include "common/core/decompositions.h"
 #include "common/core/log.h"
 #include "common/mesh/elements.h"
 #include "precompute/targets/minimum_finder.h"
@@ -75,7 +74,7 @@ Eigen::MatrixXd principal_space(const Eigen::MatrixXd& examples, const Eigen::Ma
   Eigen::MatrixXd columns(examples.rows(), 0);
   append_independent(examples, nothing, columns);
   Eigen::MatrixXd rest = samples - columns * (columns.transpose() * samples);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(rest * rest.transpose());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(Eigen::MatrixXd(rest * rest.transpose()));
   for (Eigen::Index i = gram.eigenvalues().size() - 1; i >= 0; --i) {
     if (columns.cols() > 0 && (rest.cols() == 0 || rest.colwise().norm().maxCoeff() <= distance)) break;
     append_independent(gram.eigenvectors().col(i), nothing, columns);

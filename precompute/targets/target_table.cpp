@@ -1,10 +1,10 @@
 #include "precompute/targets/target_table.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 
+#include "common/core/decompositions.h"
 #include "common/core/timer.h"
 #include "precompute/targets/minimum_finder.h"
 #include "precompute/targets/pair_terms.h"

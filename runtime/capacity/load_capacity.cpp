@@ -1,11 +1,11 @@
 #include "runtime/capacity/load_capacity.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/assembly.h"
 
 namespace exmat::runtime {

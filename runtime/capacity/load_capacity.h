@@ -1,10 +1,10 @@
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 
+#include "common/core/decompositions.h"
 #include "common/model/reduced_model.h"
 
 namespace exmat::runtime {

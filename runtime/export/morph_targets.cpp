@@ -1,13 +1,11 @@
 #include "runtime/export/morph_targets.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 
+#include "common/core/decompositions.h"
 #include "common/core/progress.h"
 
 namespace exmat::runtime {

@@ -1,12 +1,12 @@
 #include "runtime/export/surface_motion.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <vector>
 
+#include "common/core/decompositions.h"
 #include "common/core/progress.h"
 #include "runtime/export/drawn_skin.h"
 
@@ -78,7 +78,8 @@ SurfaceMotion read_surface_motion(TrajectoryReader& trajectory, const DrawnSurfa
 MotionComponents components_of(const RowMatrix& displacements, double tolerance) {
   const Eigen::Index frames = displacements.rows();
   const auto numbers = static_cast<double>(displacements.cols() / 3 * frames);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(displacements * displacements.transpose());
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(
+      Eigen::MatrixXd(displacements * displacements.transpose()));
   Eigen::Index kept = frames;  // eigenvalues ascend
   double cut = 0;
   for (Eigen::Index k = 0; k + 1 < frames; ++k, --kept) {

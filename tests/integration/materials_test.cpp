@@ -1,4 +1,3 @@
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
 #include <fmt/format.h>
@@ -8,6 +7,7 @@
 
 #include "common/bundle/bundle.h"
 #include "common/config/config.h"
+#include "common/core/decompositions.h"
 #include "common/core/error.h"
 #include "common/mesh/geometry.h"
 #include "runtime/scene/scene_loader.h"

@@ -7,6 +7,7 @@
 
 #include "common/bundle/bundle.h"
 #include "common/config/config.h"
+#include "common/core/decompositions.h"
 #include "common/elastic/materials.h"
 #include "common/mesh/geometry.h"
 #include "precompute/cubature/element_samples.h"

@@ -116,6 +116,21 @@ def petsc(root):
                 yield f"{name}:{number}: includes {header}"
 
 
+def decompositions(root):
+    """What uses a decomposition of Eigen's includes common/core/decompositions.h, where those of MatrixXd are compiled once."""
+    one = "common/core/decompositions.h"
+    used = re.compile(r"\b(LLT|LDLT|PartialPivLU|\w*HouseholderQR|\w+SVD|\w*EigenSolver)<|[.](llt|ldlt|partialPivLu|lu|\w*[hH]ouseholderQr|completeOrthogonalDecomposition|\w+Svd)\(")
+    for name, path in sources(root, ("common", "precompute", "runtime", "tests")):
+        if name in (one, "common/core/decompositions.cpp"):
+            continue
+        headers = {header for _, header in includes(path)}
+        for header in headers:
+            if re.fullmatch(r"Eigen/(Eigenvalues|SVD|QR|Cholesky|Dense)", header):
+                yield f"{name}: includes {header}"
+        if one not in headers and used.search(without_comments_and_strings(path.read_text())):
+            yield f"{name}: does not include {one}"
+
+
 def hdf5(root):
     """HDF5 is seen in common/hdf5 alone."""
     for name, path in sources(root):
@@ -201,7 +216,7 @@ def formatting(root):
             yield line
 
 
-RULES = {rule.__name__: rule for rule in (direction, lean, hot_path, petsc, hdf5, public_headers, python_module, viewer, one_header, mirrored_tests, references, columns, top_level,
+RULES = {rule.__name__: rule for rule in (direction, lean, hot_path, petsc, decompositions, hdf5, public_headers, python_module, viewer, one_header, mirrored_tests, references, columns, top_level,
                                         formatting)}
 
 

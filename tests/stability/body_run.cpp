@@ -1,6 +1,5 @@
 #include "tests/stability/body_run.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
@@ -9,6 +8,7 @@
 #include <memory>
 #include <optional>
 
+#include "common/core/decompositions.h"
 #include "common/core/timer.h"
 #include "runtime/sim/lanes/lane_step.h"
 #include "runtime/sim/step/stepper.h"

@@ -1,6 +1,5 @@
 #include "tests/stability/suite_bodies.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "common/core/atomic_file.h"
+#include "common/core/decompositions.h"
 #include "common/core/error.h"
 #include "common/mesh/geometry.h"
 #include "precompute/examples/alignment_report.h"

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <set>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/checks.h"
 #include "common/mesh/geometry.h"
 #include "tests/integration/support.h"

@@ -1,4 +1,3 @@
-#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -6,6 +5,7 @@
 #include <random>
 #include <set>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/geometry.h"
 #include "precompute/alignment/surface_tree.h"
 #include "tests/support/articulated_bodies.h"

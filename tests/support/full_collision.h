@@ -1,10 +1,10 @@
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <array>
 #include <limits>
 
+#include "common/core/decompositions.h"
 #include "tests/support/mesh_distance.h"
 #include "tests/support/synthetic_model.h"
 

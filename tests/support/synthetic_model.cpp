@@ -1,14 +1,11 @@
 #include "tests/support/synthetic_model.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
-#include <Eigen/QR>
-#include <Eigen/SVD>
 #include <cmath>
 #include <numbers>
 #include <utility>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/geometry.h"
 
 namespace exmat::test {

@@ -1,11 +1,11 @@
 #include "precompute/study/measure/nearest_phase.h"
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "common/core/decompositions.h"
 #include "precompute/shape_space/transfer.h"
 
 namespace exmat::precompute {

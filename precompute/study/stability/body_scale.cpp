@@ -1,11 +1,10 @@
 #include "precompute/study/stability/body_scale.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <random>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/geometry.h"
 
 namespace exmat::precompute {

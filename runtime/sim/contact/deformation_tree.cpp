@@ -1,8 +1,9 @@
 #include "runtime/sim/contact/deformation_tree.h"
 
-#include <Eigen/SVD>
 #include <cmath>
 #include <numeric>
+
+#include "common/core/decompositions.h"
 
 namespace exmat::runtime {
 namespace {

@@ -1,11 +1,11 @@
 #include "runtime/sim/examples/example_weights.h"
 
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <bit>
 #include <cmath>
 #include <limits>
+
+#include "common/core/decompositions.h"
 
 namespace exmat::runtime {
 namespace {

@@ -1,11 +1,11 @@
 #include "runtime/sim/examples/target.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <string>
 #include <utility>
+
+#include "common/core/decompositions.h"
 
 namespace exmat::runtime {
 namespace {

@@ -1,9 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 #include <limits>
 #include <vector>
+
+#include "common/core/decompositions.h"
 
 namespace exmat::runtime {
 

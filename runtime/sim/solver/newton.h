@@ -1,12 +1,12 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
 
+#include "common/core/decompositions.h"
 #include "runtime/kernels/aligned_array.h"
 #include "runtime/sim/elasticity/element_potential.h"
 #include "runtime/sim/solver/line_search.h"

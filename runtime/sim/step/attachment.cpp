@@ -1,6 +1,6 @@
 #include "runtime/sim/step/attachment.h"
 
-#include <Eigen/Eigenvalues>
+#include "common/core/decompositions.h"
 
 namespace exmat::runtime {
 namespace {

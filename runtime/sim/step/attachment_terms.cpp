@@ -1,8 +1,8 @@
 #include "runtime/sim/step/attachment_terms.h"
 
 #include <Eigen/LU>
-#include <Eigen/QR>
 
+#include "common/core/decompositions.h"
 #include "common/elastic/polar_rotation.h"
 #include "runtime/sim/frame/spin.h"
 

@@ -1,10 +1,10 @@
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <vector>
 
 #include "common/core/arrays.h"
+#include "common/core/decompositions.h"
 #include "runtime/sim/step/contact_step.h"
 #include "runtime/sim/step/scene.h"
 #include "runtime/sim/step/state.h"

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "common/core/decompositions.h"
 #include "runtime/sim/solver/conditions.h"
 #include "runtime/sim/solver/newton.h"
 #include "runtime/sim/world/island_momenta.h"

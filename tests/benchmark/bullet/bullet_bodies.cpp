@@ -7,11 +7,12 @@
 #include <BulletSoftBody/btDeformableMultiBodyDynamicsWorld.h>
 #include <BulletSoftBody/btSoftBodyHelpers.h>
 #include <BulletSoftBody/btSoftBodyRigidBodyCollisionConfiguration.h>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <btBulletDynamicsCommon.h>
 #include <cmath>
 #include <vector>
+
+#include "common/core/decompositions.h"
 
 namespace exmat::benchmarks {
 namespace {

@@ -1,11 +1,10 @@
 #include "common/elastic/materials.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <cmath>
 #include <gtest/gtest.h>
 
+#include "common/core/decompositions.h"
 #include "tests/support/random.h"
 
 namespace exmat {

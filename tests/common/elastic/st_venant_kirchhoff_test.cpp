@@ -1,10 +1,10 @@
 #include "common/elastic/st_venant_kirchhoff.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <gtest/gtest.h>
 #include <random>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/geometry.h"
 #include "tests/support/box_mesh.h"
 

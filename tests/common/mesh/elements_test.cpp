@@ -1,10 +1,10 @@
 // Smoothed elements by their definition: an affine displacement, sums over tets, modes without energy.
 #include "common/mesh/elements.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <gtest/gtest.h>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/assembly.h"
 #include "common/mesh/geometry.h"
 #include "tests/support/box_mesh.h"

@@ -1,11 +1,11 @@
 #include "common/mesh/geometry.h"
 
-#include <Eigen/Dense>
 #include <algorithm>
 #include <array>
 #include <gtest/gtest.h>
 #include <map>
 
+#include "common/core/decompositions.h"
 #include "tests/support/box_mesh.h"
 
 namespace exmat {

@@ -1,9 +1,9 @@
 #include "precompute/alignment/cholesky_factor.h"
 
-#include <Eigen/Dense>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "common/core/decompositions.h"
 #include "common/core/error.h"
 #include "common/mesh/assembly.h"
 #include "tests/support/box_mesh.h"

@@ -5,6 +5,7 @@
 #include <random>
 #include <unsupported/Eigen/MatrixFunctions>
 
+#include "common/core/decompositions.h"
 #include "precompute/alignment/coupled_bases.h"
 #include "precompute/alignment/spectral_tree.h"
 #include "tests/support/posed_bodies.h"

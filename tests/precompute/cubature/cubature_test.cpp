@@ -1,9 +1,9 @@
 #include "precompute/cubature/cubature.h"
 
-#include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 #include <optional>
 
+#include "common/core/decompositions.h"
 #include "common/core/error.h"
 #include "common/elastic/materials.h"
 #include "common/mesh/geometry.h"

@@ -1,10 +1,11 @@
 #include "precompute/cubature/selection.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <random>
+
+#include "common/core/decompositions.h"
 
 namespace exmat::precompute {
 namespace {

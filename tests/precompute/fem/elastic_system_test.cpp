@@ -1,10 +1,10 @@
 #include "precompute/fem/elastic_system.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <numbers>
 
+#include "common/core/decompositions.h"
 #include "common/core/error.h"
 #include "common/mesh/geometry.h"
 #include "precompute/fem/rigid_moments.h"

@@ -1,10 +1,10 @@
 #include "runtime/sim/step/attachment.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <cmath>
 #include <gtest/gtest.h>
 
+#include "common/core/decompositions.h"
 #include "runtime/sim/space/full/full_body.h"
 #include "runtime/sim/step/contact_step.h"
 #include "runtime/sim/world/world.h"

@@ -1,8 +1,8 @@
 #include "precompute/full_space/mesh_elasticity.h"
 
-#include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/geometry.h"
 #include "precompute/full_space/fitted_frame.h"
 #include "tests/precompute/full_space/full_space_bar.h"

@@ -1,8 +1,8 @@
 #include "precompute/full_space/sparse_direction.h"
 
-#include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/assembly.h"
 #include "tests/support/box_mesh.h"
 #include "tests/support/random.h"

@@ -1,8 +1,8 @@
 #include "precompute/full_space/supernodal_cholesky.h"
 
-#include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
+#include "common/core/decompositions.h"
 #include "precompute/fem/elastic_system.h"
 #include "tests/support/box_mesh.h"
 #include "tests/support/random.h"

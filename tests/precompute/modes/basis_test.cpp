@@ -4,6 +4,7 @@
 #include <optional>
 #include <random>
 
+#include "common/core/decompositions.h"
 #include "common/core/error.h"
 #include "common/elastic/materials.h"
 #include "common/mesh/geometry.h"

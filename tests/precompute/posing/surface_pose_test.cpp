@@ -1,6 +1,5 @@
 #include "precompute/posing/surface_pose.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <fmt/format.h>
@@ -9,6 +8,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "common/core/decompositions.h"
 #include "common/core/error.h"
 #include "precompute/posing/missed_pose.h"
 #include "precompute/posing/surface_springs.h"

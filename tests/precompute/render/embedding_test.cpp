@@ -1,10 +1,10 @@
 #include "precompute/render/embedding.h"
 
-#include <Eigen/Dense>
 #include <gtest/gtest.h>
 #include <limits>
 #include <random>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/assembly.h"
 #include "common/mesh/geometry.h"
 #include "precompute/alignment/surface_tree.h"

@@ -1,11 +1,11 @@
 #include "precompute/shape_space/laplace_basis.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <gtest/gtest.h>
 #include <numbers>
 #include <vector>
 
+#include "common/core/decompositions.h"
 #include "precompute/solvers/eigenpairs.h"
 #include "tests/support/box_mesh.h"
 

@@ -1,11 +1,11 @@
 #include <Eigen/Geometry>
-#include <Eigen/QR>
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <vector>
 
+#include "common/core/decompositions.h"
 #include "precompute/fem/elastic_system.h"
 #include "precompute/shape_space/region_view.h"
 #include "precompute/shape_space/region_window.h"

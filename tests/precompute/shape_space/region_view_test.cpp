@@ -1,11 +1,11 @@
 #include "precompute/shape_space/region_view.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/QR>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <random>
 
+#include "common/core/decompositions.h"
 #include "precompute/fem/elastic_system.h"
 #include "precompute/modes/linear_modes.h"
 #include "precompute/shape_space/region_poses.h"

@@ -1,12 +1,12 @@
 // Eigenpairs of slender bodies and of meshes with flat tets, against subspace iteration in long double.
 #include "precompute/solvers/eigenpairs.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/SparseCholesky>
 #include <cmath>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include "common/core/decompositions.h"
 #include "precompute/fem/elastic_system.h"
 #include "precompute/solvers/refinement.h"
 #include "tests/support/box_mesh.h"

@@ -1,12 +1,11 @@
 // Factors in single precision and block Davidson, against dense solvers in double.
 #include "precompute/solvers/mixed_solver.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <gtest/gtest.h>
 #include <string>
 #include <vector>
 
+#include "common/core/decompositions.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
 #include "precompute/fem/elastic_system.h"

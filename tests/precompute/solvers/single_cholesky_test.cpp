@@ -1,12 +1,12 @@
 #include "precompute/solvers/single_cholesky.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <gtest/gtest.h>
 #include <numeric>
 #include <omp.h>
 
+#include "common/core/decompositions.h"
 #include "precompute/fem/elastic_system.h"
 #include "precompute/solvers/dissection.h"
 #include "tests/support/box_mesh.h"

@@ -1,9 +1,9 @@
 #include "precompute/targets/target_elasticity.h"
 
-#include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 #include <omp.h>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/geometry.h"
 #include "precompute/full_space/mesh_elasticity.h"
 #include "precompute/modes/basis.h"

@@ -1,7 +1,5 @@
 #include "precompute/targets/target_table.h"
 
-#include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
@@ -9,6 +7,7 @@
 #include <random>
 
 #include "common/config/config.h"
+#include "common/core/decompositions.h"
 #include "precompute/full_space/full_space_examples.h"
 #include "precompute/pipeline/build_reduced_model.h"
 #include "runtime/sim/examples/target.h"

@@ -1,12 +1,12 @@
 #include "runtime/api/point_set.h"
 
-#include <Eigen/QR>
 #include <gtest/gtest.h>
 #include <numeric>
 #include <random>
 
 #include "common/bundle/bundle.h"
 #include "common/config/config.h"
+#include "common/core/decompositions.h"
 #include "common/mesh/geometry.h"
 #include "common/mesh/nearest_point.h"
 #include "runtime/api/failures.h"
@@ -77,7 +77,7 @@ TEST_F(PointSets, OutsideTheyAreContinuedLinearlyAndTheirDistanceIsTold) {
   EXPECT_NEAR(points.distances[1], 0.5, 1e-12);
   const Eigen::VectorXd positions = mesh().vertices.reshaped<Eigen::RowMajor>();
   const RowMatrix& basis = bar_.model.modal->basis;
-  const Eigen::VectorXd q = basis.colPivHouseholderQr().solve(positions);
+  const Eigen::VectorXd q = Eigen::MatrixXd(basis).colPivHouseholderQr().solve(positions);
   const Eigen::VectorXd fitted = basis * q;
   for (Eigen::Index i = 0; i < 2; ++i) {
     const NearestPointSearch search(mesh());

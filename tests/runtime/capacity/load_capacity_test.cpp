@@ -1,9 +1,9 @@
 #include "runtime/capacity/load_capacity.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 
+#include "common/core/decompositions.h"
 #include "tests/support/synthetic_model.h"
 
 namespace exmat::runtime {

@@ -1,8 +1,9 @@
 #include "runtime/export/morph_targets.h"
 
-#include <Eigen/SVD>
 #include <cmath>
 #include <gtest/gtest.h>
+
+#include "common/core/decompositions.h"
 
 namespace exmat::runtime {
 namespace {

@@ -1,6 +1,5 @@
 #include "runtime/kernels/kernels.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <array>
@@ -9,6 +8,7 @@
 #include <limits>
 #include <vector>
 
+#include "common/core/decompositions.h"
 #include "common/elastic/materials.h"
 #include "runtime/sim/elasticity/element_potential.h"
 #include "tests/support/instruction_sets.h"

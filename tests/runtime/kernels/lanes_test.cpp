@@ -1,11 +1,11 @@
 #include "tests/support/lanes.h"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <string>
 #include <vector>
 
+#include "common/core/decompositions.h"
 #include "runtime/kernels/aligned_array.h"
 #include "runtime/kernels/kernels.h"
 #include "runtime/sim/elasticity/element_potential.h"

@@ -1,9 +1,10 @@
 #include "runtime/sim/space/full/full_contacts.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <span>
+
+#include "common/core/decompositions.h"
 
 namespace exmat::runtime {
 

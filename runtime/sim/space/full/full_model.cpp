@@ -1,11 +1,11 @@
 #include "runtime/sim/space/full/full_model.h"
 
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <string>
 #include <utility>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/geometry.h"
 
 namespace exmat::runtime {
@@ -64,8 +64,8 @@ Eigen::MatrixXd seen_from_band(const RowMatrix& filter, const Eigen::VectorXd& s
     moved.block<3, 3>(3 * k, 0) *= ones[k];
   }
   Eigen::MatrixXd seen(3 * m, 3 * (m + kBandFunctions));
-  seen << Eigen::MatrixXd::Identity(3 * m, 3 * m),
-      -moved * G.completeOrthogonalDecomposition().pseudoInverse() * amounts;
+  const Eigen::MatrixXd inverse = Eigen::MatrixXd(G).completeOrthogonalDecomposition().pseudoInverse();
+  seen << Eigen::MatrixXd::Identity(3 * m, 3 * m), Eigen::MatrixXd(-moved * inverse * amounts);
   return seen;
 }
 

@@ -1,6 +1,5 @@
 #include "runtime/sim/space/full/full_space.h"
 
-#include <Eigen/Cholesky>
 #include <Eigen/OrderingMethods>
 #include <Eigen/SparseCholesky>
 #include <algorithm>
@@ -11,6 +10,7 @@
 #include <tuple>
 #include <utility>
 
+#include "common/core/decompositions.h"
 #include "common/elastic/materials.h"
 #include "common/mesh/geometry.h"
 #include "runtime/sim/elasticity/element_potential.h"

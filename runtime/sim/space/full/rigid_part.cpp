@@ -2,7 +2,8 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <Eigen/SVD>
+
+#include "common/core/decompositions.h"
 
 namespace exmat::runtime {
 namespace {

@@ -1,10 +1,10 @@
 #include "runtime/sim/contact/contact.h"
 
-#include <Eigen/Dense>
 #include <gtest/gtest.h>
 #include <numbers>
 #include <set>
 
+#include "common/core/decompositions.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/random.h"
 #include "tests/support/surfaces.h"

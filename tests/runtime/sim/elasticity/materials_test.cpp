@@ -1,9 +1,9 @@
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <tuple>
 
+#include "common/core/decompositions.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/random.h"
 #include "tests/support/scenes.h"

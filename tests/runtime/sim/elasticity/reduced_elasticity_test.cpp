@@ -1,8 +1,8 @@
 #include "runtime/sim/elasticity/reduced_elasticity.h"
 
-#include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
 
+#include "common/core/decompositions.h"
 #include "runtime/sim/step/model.h"
 #include "tests/support/random.h"
 #include "tests/support/synthetic_model.h"

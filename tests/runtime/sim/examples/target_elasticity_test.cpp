@@ -1,9 +1,9 @@
 #include "runtime/sim/examples/target_elasticity.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 
+#include "common/core/decompositions.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/random.h"
 #include "tests/support/synthetic_model.h"

@@ -1,9 +1,9 @@
 #include "runtime/sim/examples/target.h"
 
-#include <Eigen/LU>
 #include <gtest/gtest.h>
 #include <tuple>
 
+#include "common/core/decompositions.h"
 #include "runtime/sim/step/model.h"
 #include "tests/support/random.h"
 #include "tests/support/synthetic_model.h"

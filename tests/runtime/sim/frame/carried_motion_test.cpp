@@ -1,10 +1,10 @@
 #include "runtime/sim/frame/carried_motion.h"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <vector>
 
+#include "common/core/decompositions.h"
 #include "runtime/sim/step/stepper.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/random.h"

@@ -1,9 +1,9 @@
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <numbers>
 
+#include "common/core/decompositions.h"
 #include "runtime/sim/step/stepper.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/synthetic_model.h"
@@ -144,11 +144,11 @@ TEST(ContactStep, AStepThatDoesNotConvergeGivesTheMomentumOfItsWay) {
       const Eigen::Vector3d of_way = dropped.mass() / dt * (after.position - before.position);
       // The rest is all of the flight without contacts and a share of what they gave; less of the flight only where
       // that is not enough, since the pose alone has the energy.
-      Eigen::Matrix<double, 3, 2> parts;
+      Eigen::MatrixXd parts(3, 2);
       parts.col(0) = before.linear_momentum + dt * dropped.mass() * dropped.scene.gravity;
       parts.col(1) = of_way - parts.col(0);
       if (parts.col(1).norm() <= 1e-9 * of_way.norm()) continue;  // nothing touched
-      const Eigen::Vector2d left = parts.colPivHouseholderQr().solve(after.linear_momentum);
+      const Eigen::VectorXd left = parts.colPivHouseholderQr().solve(after.linear_momentum);
       EXPECT_LE((after.linear_momentum - parts * left).norm(), 1e-9 * of_way.norm()) << stiffness << " step " << i;
       EXPECT_LE(left[0], 1 + 1e-9) << stiffness << " step " << i;
       EXPECT_LE(left[1], left[0] + 1e-9) << stiffness << " step " << i;

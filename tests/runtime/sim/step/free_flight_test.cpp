@@ -1,11 +1,10 @@
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <numbers>
 #include <vector>
 
+#include "common/core/decompositions.h"
 #include "runtime/sim/step/stepper.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/random.h"

@@ -1,9 +1,9 @@
 #include "runtime/sim/step/impulse_response.h"
 
-#include <Eigen/LU>
 #include <cmath>
 #include <gtest/gtest.h>
 
+#include "common/core/decompositions.h"
 #include "runtime/sim/step/stepper.h"
 #include "tests/support/random.h"
 #include "tests/support/synthetic_model.h"

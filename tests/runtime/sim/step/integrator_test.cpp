@@ -1,9 +1,9 @@
 #include "runtime/sim/step/integrator.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <gtest/gtest.h>
 
+#include "common/core/decompositions.h"
 #include "tests/support/scenes.h"
 
 namespace exmat::runtime {

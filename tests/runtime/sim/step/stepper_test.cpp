@@ -1,11 +1,11 @@
 #include "runtime/sim/step/stepper.h"
 
-#include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 #include <limits>
 #include <string>
 #include <tuple>
 
+#include "common/core/decompositions.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/random.h"
 #include "tests/support/scenes.h"

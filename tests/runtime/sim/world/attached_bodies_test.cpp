@@ -1,5 +1,4 @@
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <array>
 #include <cmath>
 #include <complex>
@@ -7,6 +6,7 @@
 #include <gtest/gtest.h>
 #include <optional>
 
+#include "common/core/decompositions.h"
 #include "runtime/scene/attachment_loader.h"
 #include "tests/runtime/sim/world/touching_blocks.h"
 

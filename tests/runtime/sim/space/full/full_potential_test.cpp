@@ -1,8 +1,8 @@
 #include "runtime/sim/space/full/full_potential.h"
 
-#include <Eigen/Eigenvalues>
 #include <gtest/gtest.h>
 
+#include "common/core/decompositions.h"
 #include "common/elastic/materials.h"
 #include "common/mesh/assembly.h"
 #include "tests/runtime/sim/space/full/full_bar.h"
@@ -141,9 +141,9 @@ double least_eigenvalue(Potential& of) {
   for (Eigen::Index i = 0; i < size; ++i)
     dense.col(i) =
         i % 4 == 3 ? Eigen::VectorXd::Zero(size) : of.product(Eigen::VectorXd::Unit(size, i), /*with_matrices=*/false);
-  const Eigen::VectorXd values =
-      Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(0.5 * (dense + dense.transpose()), Eigen::EigenvaluesOnly)
-          .eigenvalues();
+  const Eigen::VectorXd values = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(
+                                     Eigen::MatrixXd(0.5 * (dense + dense.transpose())), Eigen::EigenvaluesOnly)
+                                     .eigenvalues();
   return values[0] / values.tail(1)[0];
 }
 

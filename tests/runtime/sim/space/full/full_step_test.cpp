@@ -1,12 +1,12 @@
 #include "runtime/sim/space/full/full_step.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <numbers>
 #include <omp.h>
 #include <string>
 
+#include "common/core/decompositions.h"
 #include "common/mesh/assembly.h"
 #include "tests/runtime/sim/space/full/full_bar.h"
 #include "tests/support/allocation_counter.h"
