@@ -164,6 +164,7 @@ class Teams {
 
 Scheduler host;
 
+// What the host has left when it returns, the caller does.
 void run_on_host(const SharedLoop& loop) noexcept {
   struct Shared {
     const SharedLoop& loop;
@@ -171,9 +172,11 @@ void run_on_host(const SharedLoop& loop) noexcept {
   } shared{loop};
   const auto task = [](void* data, std::int32_t thread) {
     auto& [own, next] = *static_cast<Shared*>(data);
-    take_shares(own, next, static_cast<std::size_t>(thread));
+    const auto number = static_cast<std::size_t>(thread);
+    if (number < own.threads) take_shares(own, next, number);
   };
   host.run(host.user, task, &shared, static_cast<std::int32_t>(loop.threads));
+  task(&shared, 0);
 }
 
 }  // namespace

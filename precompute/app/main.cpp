@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <fmt/format.h>
@@ -30,13 +31,19 @@ struct CheckOptions {
   std::string alignment_report;
 };
 
+/// A number that a refused pose does not have is a line.
+std::string number_or_line(double number, int digits) {
+  return std::isfinite(number) ? fmt::format("{:.{}f}", number, digits) : "-";
+}
+
 void print_alignments(const std::vector<precompute::AlignmentOutcome>& outcomes) {
   fmt::print("\n{:<20}{:<20}{:>12}{:>14}{:>14}{:>12}{:>16}  {}\n", "example", "method", "doubt", "residual [%]",
              "inverted [%]", "competing", "lost by m [%]", "alignment");
   for (const auto& outcome : outcomes)
-    fmt::print("{:<20}{:<20}{:>12.3f}{:>14.2f}{:>14.2f}{:>12}{:>16.2f}  {}\n", outcome.name, outcome.method,
-               outcome.doubt, 100 * outcome.residual, 100 * outcome.inverted_fraction, outcome.competing_maps,
-               100 * outcome.shape_space_error, precompute::name_of(outcome.verdict));
+    fmt::print("{:<20}{:<20}{:>12}{:>14}{:>14}{:>12}{:>16}  {}\n", outcome.name, outcome.method,
+               number_or_line(outcome.doubt, 3), number_or_line(100 * outcome.residual, 2),
+               number_or_line(100 * outcome.inverted_fraction, 2), outcome.competing_maps,
+               number_or_line(100 * outcome.shape_space_error, 2), precompute::name_of(outcome.verdict));
 }
 
 void check(const CheckOptions& options) {

@@ -42,6 +42,7 @@ void mesh_command(const MeshCommandOptions& options) {
     throw InputError({options.mesh, "", "a mesh to write with the extension .msh", "another", ""});
   const SurfaceFile surface = precompute::read_surface_file(options.surface);
   precompute::log_notes(surface, options.surface);
+  precompute::warn_of_flat_body(surface.mesh, options.surface);
   const precompute::Cage cage = precompute::make_cage(surface.mesh, options.settings, options.surface);
   precompute::write_msh(cage.mesh, options.mesh);
   print_cage(options, surface, cage);

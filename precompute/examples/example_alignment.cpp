@@ -329,6 +329,7 @@ AlignedPose ExampleAligner::align_pose(const AlignedRest& rest, const PoseInput&
     aligned.positions = placed_positions(pose.mesh, placing);
     aligned.outcome = {pose.name, "same_connectivity", rest.outcome.residual, rest.outcome.doubt,
                        pose.inverted_fraction};
+    if (!pose.fault.empty()) object_to(aligned.outcome, AlignmentVerdict::kDoubtful, pose.fault);
   } else {
     const AlignmentConfig& config = asset_.alignment;
     const bool couples = config.method == AlignmentMethod::kCoupled;

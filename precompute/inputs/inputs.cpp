@@ -183,7 +183,7 @@ class ExampleReader {
   void read_rest();
   void read_pose(const ExampleConfig& example);
   bool read_surface_pose(const ExampleConfig& example);
-  void judge_miss(const SurfacePose& fitted, const VertexArray& posed, const ExampleConfig& example) const;
+  std::string judge_miss(const SurfacePose& fitted, const VertexArray& posed, const ExampleConfig& example) const;
   MeshFile read_tets(const ExampleConfig& example);
   bool poses_rest(const MeshFile& file) const;
   void read_correspondences(PoseInput& example);
@@ -254,15 +254,13 @@ MeshFile ExampleReader::read_tets(const ExampleConfig& example) {
   return file;
 }
 
-// Warns of a pose that no elastic body takes, or that the cage misses; refuses one that it misses by far.
-void ExampleReader::judge_miss(const SurfacePose& fitted, const VertexArray& posed,
-                               const ExampleConfig& example) const {
+// The fault of a pose that no elastic body takes, or none. Warns of one that the cage misses; refuses one that it
+// misses by far.
+std::string ExampleReader::judge_miss(const SurfacePose& fitted, const VertexArray& posed,
+                                      const ExampleConfig& example) const {
   const SurfaceMesh& rest = object_.surface->file().mesh;
-  if (fitted.rms <= kMissWarned) {
-    const std::string fault = fault_of_pose(rest, posed);
-    if (!fault.empty()) log::warning(fmt::format("example {}: {}", example.name, fault));
-    return;
-  }
+  const std::string fault = fault_of_pose(rest, posed);
+  if (fitted.rms <= kMissWarned) return fault;
   const std::string found = fmt::format("{:.1f} % (RMS), {:.1f} % at most", 100 * fitted.rms, 100 * fitted.farthest);
   const std::string advice = reason_of_miss(rest, posed, fitted);
   if (fitted.rms > kMissRefused && !asset_.alignment.accept)
@@ -270,6 +268,7 @@ void ExampleReader::judge_miss(const SurfacePose& fitted, const VertexArray& pos
                       fmt::format("a pose that the cage follows within {:g} % of its size", 100 * kMissRefused), found,
                       advice});
   log::warning(fmt::format("example {}: the cage misses the pose by {} of its size; {}", example.name, found, advice));
+  return fault;
 }
 
 // A pose of the object's surface, on the object's own tets. False where the example's surface has other vertices.
@@ -282,12 +281,13 @@ bool ExampleReader::read_surface_pose(const ExampleConfig& example) {
                       "leave the rest example out: the object at rest is it"});
   if (known_poses_.empty()) known_poses_.push_back(object_.surface->rest());
   const SurfacePose fitted = object_.surface->pose(*posed, known_poses_, "example " + example.name, cache_);
-  judge_miss(fitted, *posed, example);
+  const std::string fault = judge_miss(fitted, *posed, example);
   known_poses_.push_back({*posed, fitted.positions});
   PoseInput pose{example.name, example.file(asset_.object_mesh), {}};
   // The cage is kept whole, so its vertices are the file's.
   pose.mesh = {fitted.positions, object_.mesh.tets};
   pose.surface = SurfaceMiss{fitted.rms, fitted.farthest, fitted.iterations};
+  pose.fault = fault;
   meshes_[example.name] = {rest_numbers_, fitted.positions};
   read_correspondences(pose);
   input_.poses.push_back(std::move(pose));

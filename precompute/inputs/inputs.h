@@ -51,6 +51,7 @@ struct PoseInput {
   Eigen::Index column = 0;           ///< in ExampleInput::landmarks
   std::vector<IndexVector> parts{};  ///< for each of ExampleInput::parts its vertices of `mesh`; none where not given
   std::optional<SurfaceMiss> surface{};  ///< present for a pose of the object's surface
+  std::string fault{};                   ///< why no elastic body takes it, though it was read
 };
 
 /// A region of the asset, and the poses that act there.

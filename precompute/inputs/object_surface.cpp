@@ -46,7 +46,9 @@ ObjectSurface::ObjectSurface(const AssetConfig& asset, InputFiles& files, StageC
       file_(read_recorded_surface(*asset.object_surface, asset, files)),
       cage_(cached_cage(file_.mesh, asset, asset.object_surface->string(), cache)),
       embedding_(embed_points(cage_.mesh, file_.mesh.vertices, asset.object_surface->string())),
-      tree_(file_.mesh.vertices, file_.mesh.triangles) {}
+      tree_(file_.mesh.vertices, file_.mesh.triangles) {
+  warn_of_flat_body(file_.mesh, *asset.object_surface);
+}
 
 VertexMarks ObjectSurface::marks_at(const VertexArray& points) const {
   VertexMarks marks;

@@ -39,16 +39,21 @@ SurfaceFile read_surface_file(const std::filesystem::path& file) {
   if (const auto loose = settle_loose_vertices(triangles, surface.mesh.vertices); loose > 0)
     surface.remarks.push_back(fmt::format("{} vertices of no triangle are left out of account", loose));
   for (MorphTarget& morph : surface.morphs) settle_loose_vertices(triangles, morph.positions);
-  if (is_flat(surface.mesh.vertices))
-    surface.warnings.emplace_back(
-        "the surface is flat: as a body it is a sheet as thick as the cells that enclose it; give it a thickness, and "
-        "scale no object by 0");
   return surface;
 }
 
 void log_notes(const SurfaceFile& surface, const std::filesystem::path& file) {
   for (const std::string& remark : surface.remarks) log::info(fmt::format("{}: {}", file.string(), remark));
   for (const std::string& warning : surface.warnings) log::warning(fmt::format("{}: {}", file.string(), warning));
+}
+
+void warn_of_flat_body(const SurfaceMesh& surface, const std::filesystem::path& file) {
+  if (!is_flat(surface.vertices)) return;
+  log::warning(
+      fmt::format("{}: the surface is flat: as a body it is a sheet as thick as the cells that enclose it; give it a "
+                  "thickness, and "
+                  "scale no object by 0",
+                  file.string()));
 }
 
 }  // namespace exmat::precompute

@@ -17,6 +17,9 @@ SurfaceFile read_surface_file(const std::filesystem::path& file);
 /// Logs what reading the surface remarked on and warned of; `file` is for the messages.
 void log_notes(const SurfaceFile& surface, const std::filesystem::path& file);
 
+/// Warns where all vertices of an object's surface lie in a plane.
+void warn_of_flat_body(const SurfaceMesh& surface, const std::filesystem::path& file);
+
 /// One frame, 0-based, of a point cache (.pc2): `vertices` x 3. Throws InputError that names the frames and vertices
 /// that the file has, where it has no such frame or another number of vertices.
 VertexArray read_point_cache_frame(const std::filesystem::path& file, std::int64_t frame, Eigen::Index vertices);

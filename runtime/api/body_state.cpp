@@ -9,14 +9,15 @@
 #include "runtime/api/state_numbers.h"
 #include "runtime/api/world_handle.h"
 #include "runtime/scene/state_hash.h"
+#include "runtime/sim/frame/free_frame.h"
 
 namespace exmat::runtime {
 namespace {
 
 constexpr double kLayout = 4;
 
-constexpr Eigen::VectorXd State::*kModeArrays[] = {&State::q,          &State::v, &State::q_previous,
-                                                   &State::v_previous, &State::a, &State::applied_force};
+constexpr Eigen::VectorXd State::*kModeArrays[] = {&State::q, &State::v, &State::q_previous, &State::v_previous,
+                                                   &State::a};
 
 constexpr Eigen::VectorXd FullMotion::*kVertexArrays[] = {&FullMotion::q, &FullMotion::v, &FullMotion::q_previous,
                                                           &FullMotion::v_previous};
@@ -53,7 +54,9 @@ void visit_frame(StateWriter& archive, const exmat_body& body) {
 }
 
 void visit_frame(StateReader& archive, exmat_body& body) {
-  const auto numbers = archive.take(body.frame_numbers);
+  const bool is_free = std::holds_alternative<FreeState>(body.state.frame);
+  const auto numbers = is_free ? archive.take(body.frame_numbers, FreeFrame::kFirstLoad, FreeFrame::kLoads)
+                               : archive.take(body.frame_numbers);
   if (!archive.checks()) body.model().frame->set_numbers(numbers, body.state.frame);
 }
 
@@ -68,9 +71,10 @@ void visit(Archive& archive, Body& body) {
   const std::size_t contacts =
       archive.whole("contacts", state.contacts.count, static_cast<double>(state.contacts.held.size() + 1));
   const bool in_full_space = visit_space(archive, body);
-  archive.number(state.elastic_energy);
+  archive.load(state.elastic_energy);
   for (const auto member : kModeArrays) archive.array(state.*member);
-  archive.array(state.vertex_force);
+  archive.load(state.applied_force);
+  archive.load(state.vertex_force);
   if (in_full_space && archive.checks()) {
     archive.skip(1 + std::size(kVertexArrays) * static_cast<std::size_t>(state.vertex_force.size()));
     if (body.model().skeleton) archive.skip(write_numbers(*body.start.full->skeleton, nullptr));
@@ -94,7 +98,7 @@ void visit(Archive& archive, Body& body) {
   for (auto& held : std::span(state.contacts.held).first(contacts)) {
     archive.whole("vertex", held.vertex, static_cast<double>(body.model().contact->vertices()));
     archive.whole("obstacle", held.obstacle, static_cast<double>(body.scene.obstacles.size()));
-    archive.number(held.normal_force);
+    archive.load(held.normal_force);
     archive.array(held.anchor);
     archive.array(held.way_out);
     archive.not_negative("overlaps of contacts", held.overlap);
@@ -109,9 +113,7 @@ std::size_t state_size(const exmat_body& body) {
 
 /// Throws where numbers are not those of a state of this body.
 void check(std::span<const double> numbers, exmat_body& body) {
-  if (const double* const far = find_far(numbers.data(), std::ssize(numbers)))
-    throw InvalidArgument(fmt::format("numbers: {}: expected finite ones of at most {}", *far, kFarthest));
-  StateReader reader(numbers, StateReader::Use::kCheck);
+  StateReader reader(numbers, StateReader::Use::kCheck, kFarthest);
   visit(reader, body);
   if (reader.left() > 0)
     throw InvalidArgument(fmt::format("numbers: {}: expected {}", numbers.size(), numbers.size() - reader.left()));

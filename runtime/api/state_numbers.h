@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,6 +27,12 @@ class StateWriter {
   void number(double number) noexcept {
     if (fits(1)) to_[count_] = number;
     ++count_;
+  }
+  /// A force or an energy.
+  void load(double load) noexcept { number(load); }
+  template <typename Dense>
+  void load(const Dense& load) noexcept {
+    array(load);
   }
   template <typename Dense>
   void array(const Dense& array) noexcept {
@@ -75,23 +82,32 @@ class StateWriter {
 class StateReader {
  public:
   enum class Use { kCheck, kTake };
-  StateReader(std::span<const double> numbers, Use use) : numbers_(numbers), takes_(use == Use::kTake) {}
+  /// A check refuses numbers that are not finite or beyond `farthest`, of forces and energies not finite alone; without
+  /// it any number is taken, as it was saved.
+  StateReader(std::span<const double> numbers, Use use, std::optional<double> farthest = {})
+      : numbers_(numbers), takes_(use == Use::kTake), farthest_(farthest) {}
 
   std::size_t left() const noexcept { return numbers_.size(); }
   bool checks() const noexcept { return !takes_; }
 
-  std::span<const double> take(std::size_t count) {
-    if (count > numbers_.size()) throw InvalidArgument("numbers: they end early: are they of another model or world?");
-    const auto taken = numbers_.first(count);
-    numbers_ = numbers_.subspan(count);
+  std::span<const double> take(std::size_t count) { return take_within(farthest_.value_or(kMost), count); }
+  /// Of which `loads` from `first` on are forces.
+  std::span<const double> take(std::size_t count, std::size_t first, std::size_t loads) {
+    const auto taken = take_within(kMost, count);
+    require_within(farthest_.value_or(kMost), taken.first(first));
+    require_within(farthest_.value_or(kMost), taken.subspan(first + loads));
     return taken;
   }
   void skip(std::size_t count) { take(count); }
   void number(double& number) { set(take(1).front(), number); }
+  void load(double& load) { set(take_within(kMost, 1).front(), load); }
+  template <typename Dense>
+  void load(Dense& load) {
+    copy(take_within(kMost, static_cast<std::size_t>(load.size())), load);
+  }
   template <typename Dense>
   void array(Dense& array) {
-    const auto from = take(static_cast<std::size_t>(array.size()));
-    if (takes_) std::copy_n(from.data(), from.size(), array.data());
+    copy(take(static_cast<std::size_t>(array.size())), array);
   }
   /// Into an array that gets this size.
   template <typename Dense>
@@ -114,7 +130,7 @@ class StateReader {
     return found == 1;
   }
   void not_negative(const char* name, double& value) {
-    const double found = take(1).front();
+    const double found = take_within(kMost, 1).front();
     if (!(found >= 0)) throw InvalidArgument(fmt::format("numbers: expected {} >= 0", name));
     set(found, value);
   }
@@ -137,6 +153,25 @@ class StateReader {
   }
 
  private:
+  static constexpr double kMost = std::numeric_limits<double>::max();
+
+  std::span<const double> take_within(double most, std::size_t count) {
+    if (count > numbers_.size()) throw InvalidArgument("numbers: they end early: are they of another model or world?");
+    const auto taken = numbers_.first(count);
+    require_within(most, taken);
+    numbers_ = numbers_.subspan(count);
+    return taken;
+  }
+  void require_within(double most, std::span<const double> numbers) const {
+    if (!checks() || !farthest_) return;
+    for (const double number : numbers)
+      if (!(std::abs(number) <= most))
+        throw InvalidArgument(fmt::format("numbers: {}: expected finite ones of at most {}", number, most));
+  }
+  template <typename Dense>
+  void copy(std::span<const double> from, Dense& to) const {
+    if (takes_) std::copy_n(from.data(), from.size(), to.data());
+  }
   template <typename Value>
   void set(Value found, Value& value) const noexcept {
     if (takes_) value = found;
@@ -144,6 +179,7 @@ class StateReader {
 
   std::span<const double> numbers_;
   bool takes_;
+  std::optional<double> farthest_;
 };
 
 }  // namespace exmat::runtime

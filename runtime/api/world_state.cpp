@@ -34,10 +34,10 @@ void visit_anew(StateReader& archive, exmat_world& world, int body) {
 }
 
 /// A bound that may be infinite, which no number of a state is.
-void visit_bound(StateWriter& archive, double bound) { archive.number(std::isfinite(bound) ? bound : -1); }
+void visit_bound(StateWriter& archive, double bound) { archive.load(std::isfinite(bound) ? bound : -1); }
 
 void visit_bound(StateReader& archive, double& bound) {
-  archive.number(bound);
+  archive.load(bound);
   if (!archive.checks() && bound < 0) bound = std::numeric_limits<double>::infinity();
 }
 
@@ -53,7 +53,7 @@ void visit_contacts(Archive& archive, Contacts& contacts, std::size_t count, con
       throw InvalidArgument("numbers: expected vertices of a contact in ascending order");
     end = vertex + 1;
     archive.number(held.gap);
-    archive.number(held.normal_force);
+    archive.load(held.normal_force);
     archive.not_negative("overlaps of contacts", held.overlap);
     archive.array(held.stretch);
     archive.array(held.normal);
@@ -398,17 +398,14 @@ std::span<const double> numbers_of(const void* buffer, std::size_t size, const e
 
 /// Throws where the archive does not fit the world.
 template <typename Visit>
-void check(std::span<const double> numbers, const Visit& visit) {
-  StateReader reader(numbers, StateReader::Use::kCheck);
+void check(StateReader reader, const Visit& visit) {
+  const std::size_t count = reader.left();
   visit(reader);
-  if (reader.left() > 0)
-    throw InvalidArgument(fmt::format("numbers: {}: expected {}", numbers.size(), numbers.size() - reader.left()));
+  if (reader.left() > 0) throw InvalidArgument(fmt::format("numbers: {}: expected {}", count, count - reader.left()));
 }
 
 void set_world(std::span<const double> numbers, exmat_world& world) {
-  if (const double* const far = find_far(numbers.data(), std::ssize(numbers)))
-    throw InvalidArgument(fmt::format("numbers: {}: expected finite ones of at most {}", *far, kFarthest));
-  check(numbers, [&](StateReader& reader) { visit_motion(reader, world); });
+  check({numbers, StateReader::Use::kCheck, kFarthest}, [&](StateReader& reader) { visit_motion(reader, world); });
   const double time = time_of(world);
   StateReader reader(numbers, StateReader::Use::kTake);
   visit_motion(reader, world);
@@ -472,7 +469,7 @@ exmat_status exmat_world_restore(exmat_world* world, const void* buffer, std::si
   if (!is_aligned(buffer)) return fail(EXMAT_INVALID_ARGUMENT, "%s: buffer: expected one aligned to 8 bytes", __func__);
   return guarded(__func__, [&] {
     const auto numbers = numbers_of(buffer, size, *world);
-    check(numbers, [&](StateReader& reader) { visit_snapshot(reader, *world); });
+    check({numbers, StateReader::Use::kCheck}, [&](StateReader& reader) { visit_snapshot(reader, *world); });
     StateReader reader(numbers, StateReader::Use::kTake);
     visit_snapshot(reader, *world);
   });

@@ -21,9 +21,11 @@ Shape make_shape(const BoxConfig& box) { return Box{box.centre, box.half_extents
 Shape make_shape(const CapsuleConfig& capsule) { return Capsule{capsule.start, capsule.end, capsule.radius}; }
 
 Shape make_shape(const MeshConfig& mesh) {
-  SurfaceMesh surface = std::move(read_plain_surface(mesh.file).mesh);
-  weld(surface.vertices, surface.triangles);
+  SurfaceFile read = read_plain_surface(mesh.file);
   const std::string file = mesh.file.string();
+  for (const std::string& warning : read.warnings) log::warning(fmt::format("{}: {}", file, warning));
+  SurfaceMesh& surface = read.mesh;
+  weld(surface.vertices, surface.triangles);
   if (surface.triangles.rows() == 0)
     throw InputError({file, "", "triangles with corners at three places", "none", "check the file and its scale"});
   if (mesh.thickness == 0) {

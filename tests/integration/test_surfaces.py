@@ -297,10 +297,12 @@ class Surfaces(unittest.TestCase):
         self.assertIn("it is a mirror image of the object", self.refused(examples=mirrored))
         _, printed = self.bundle(examples=mirrored, alignment={"accept": True})
         self.assertIn("[warning] example other: the cage misses the pose by", printed)
+        self.assertIn("[warning] example other: alignment doubtful: it is a mirror image of the object", printed)
         squeezed = self.points * [1, 1, 0]
         write_obj(self.folder / "mirrored.obj", squeezed, self.triangles)
         _, printed = self.bundle(examples=mirrored, alignment={"accept": True})
         self.assertRegex(printed, "warning. example other: .*it squeezes the body to .* times its thickness")
+        self.assertNotIn("the surface is flat", printed)
         scattered = self.points[np.random.default_rng(1).permutation(len(self.points))]
         write_obj(self.folder / "mirrored.obj", scattered, self.triangles)
         self.assertRegex(self.refused(examples=mirrored), "example other: .* so its vertices are in another order")

@@ -114,7 +114,8 @@ EXMAT_API exmat_status exmat_world_step(exmat_world* world, int64_t steps, int32
                                         exmat_world_report* report) EXMAT_NOEXCEPT;
 
 /* Runs tasks on a host's threads: calls task(data, i) once for each i < count, at the same time where it can, and
-   returns when all have returned. They may be called by any thread, and do not wait for each other. */
+   returns when all have returned. They may be called by any thread, and do not wait for each other; the caller does the
+   work of those that were not called. */
 typedef void (*exmat_run_tasks)(void* user, void (*task)(void* data, int32_t i), void* data, int32_t count);
 /* Shares steps of all worlds of this process among the threads of `run` from then on; NULL: among the library's own.
    Not while a world steps. A call of `run` gets at most `threads` tasks. */

@@ -19,7 +19,8 @@ const FreeMotionWorkspace& own_free(const FrameWorkspace& workspace) {
 template <typename Body, typename Visitor>
 void visit_numbers(Body& body, Visitor& visitor) {
   visitor(body.position, body.orientation.coeffs(), body.linear_momentum, body.angular_momentum, body.spin,
-          body.applied_force, body.applied_torque, body.momentum, body.momentum_previous);
+          body.applied_force, body.applied_torque,  // FreeFrame::kFirstLoad
+          body.momentum, body.momentum_previous);
 }
 
 }  // namespace

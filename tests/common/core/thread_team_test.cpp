@@ -40,8 +40,17 @@ void run_on_new_threads(void* user, void (*task)(void*, std::int32_t), void* dat
   for (std::thread& thread : threads) thread.join();
 }
 
+/// A host that calls none of its tasks, and one that calls some that it was not given.
+void run_nothing(void* user, void (* /*task*/)(void*, std::int32_t), void* /*data*/, std::int32_t /*count*/) {
+  ++*static_cast<int*>(user);
+}
+void run_others(void* user, void (*task)(void*, std::int32_t), void* data, std::int32_t count) {
+  ++*static_cast<int*>(user);
+  for (const std::int32_t i : {-1, count, count + 1, 1}) task(data, i);
+}
+
 TEST(ThreadTeam, RunsOnThreadsOfAHost) {
-  for (const auto run : {run_backwards, run_on_new_threads}) {
+  for (const auto run : {run_backwards, run_on_new_threads, run_nothing, run_others}) {
     int runs = 0;
     set_scheduler({run, &runs});
     for (const std::size_t count : {2, 7, 1000})

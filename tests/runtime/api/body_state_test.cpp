@@ -92,6 +92,20 @@ TEST_P(BodyStates, ABodyThatTakesAStateGoesOnToTheLastBit) {
   }
 }
 
+TEST_P(BodyStates, ABodyTakesItsOwnStateWhateverForceItHasBeenGiven) {
+  const exmat::Model model = make(GetParam());
+  exmat::Body body(model), other(model);
+  const exmat::Points points = exmat::Points::vertices(model, std::vector<std::int64_t>{7});
+  try {
+    body.apply_forces(points, std::vector<double>{0, 1e100, -1e250});
+  } catch (
+      const exmat::Error&) {  // in all vertices they are bounded: by the same number, and a vertex has many of them
+    for (int i = 0; i < 3; ++i) body.apply_forces(points, std::vector<double>{0, 1e29, -1e30});
+  }
+  other.set_state(body.state());
+  EXPECT_EQ(other.state(), body.state());
+}
+
 TEST_P(BodyStates, TheHashIsThatOfARun) {
   const exmat::Model model = make(GetParam());
   exmat::Body body(model), second(model);
@@ -156,6 +170,7 @@ TEST_F(BadBodyState, IsRefusedAndTheBodyIsAsItWas) {
   EXPECT_THAT(refusal(good.size() - 10, 1e6), HasSubstr("vertex = 1e+06: expected a whole number below"));
   EXPECT_THAT(refusal(good.size() - 9, 1), HasSubstr("obstacle = 1: expected a whole number below 1"));
   EXPECT_EQ(refusal(5, good[5]), "taken");
+  EXPECT_THAT(refusal(7, 1e31), HasSubstr("numbers: 1e+31: expected finite ones of at most 1e+30"));
 }
 
 class ExamplesOfABody : public BodyStates {

@@ -93,13 +93,15 @@ TEST(ObstacleLoader, RefusesMeshesThatAreNotClosedUnlessTheyAreShells) {
               HasSubstr("triangles with corners at three places, found none"));
 }
 
-TEST(ObstacleLoader, WarnsOfFacesThatLookInward) {
+TEST(ObstacleLoader, WarnsOfFacesThatLookInwardOrCrossThemselves) {
   const test::TemporaryFolder folder;
   std::string warned;
   const log::Sink former = log::set_sink([&](log::Level, std::string_view message) { warned += message; });
   const Shape room = with_mesh(folder.write("room.obj", cube(false, false, true)), 1, 0).front()->shape;
+  with_mesh(folder.write("bow.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 3 2 4\n"), 1, 0.1);
   log::set_sink(former);
   EXPECT_THAT(warned, HasSubstr("room.obj: its faces look inward"));
+  EXPECT_THAT(warned, HasSubstr("bow.obj: 1 face whose edges cross is cut"));
   EXPECT_NEAR(signed_distance(room, Eigen::Vector3d(0, 0, 5)), 1, 1e-14);
 }
 
