@@ -74,7 +74,8 @@ void DeformationTree::build(const Points& points, int first, int last) {
     (middles.colwise().maxCoeff() - middles.colwise().minCoeff()).maxCoeff(&axis);
     int half = first + (last - first) / 2;
     if (points.full_leaves) half += (points.leaf_items - (half - first) % points.leaf_items) % points.leaf_items;
-    std::nth_element(order_.begin() + first, order_.begin() + half, order_.begin() + last, [&](int a, int b) {
+    // All in one order: what nth_element leaves of it is another with each standard library.
+    std::sort(order_.begin() + first, order_.begin() + last, [&](int a, int b) {
       const double at_a = points.middle(a)[axis], at_b = points.middle(b)[axis];
       return at_a != at_b ? at_a < at_b : a < b;
     });

@@ -61,7 +61,8 @@ void RigidMesh::build(const std::vector<Box>& boxes, std::vector<int>& order, in
   Eigen::Index axis = 0;
   (middles.high - middles.low).maxCoeff(&axis);
   const int half = first + (last - first) / 2;
-  std::nth_element(order.begin() + first, order.begin() + half, order.begin() + last, [&](int a, int b) {
+  // All in one order: what nth_element leaves of it is another with each standard library.
+  std::sort(order.begin() + first, order.begin() + last, [&](int a, int b) {
     const Box &box_a = boxes[static_cast<std::size_t>(a)], &box_b = boxes[static_cast<std::size_t>(b)];
     const double at_a = box_a.low[axis] + box_a.high[axis], at_b = box_b.low[axis] + box_b.high[axis];
     return at_a != at_b ? at_a < at_b : a < b;

@@ -113,12 +113,13 @@ FullContactScratch::Block& FullContactScratch::at(Eigen::Index place) noexcept {
 }
 
 void FullContactScratch::set_scales(const Eigen::VectorXd& inverse_diagonal) noexcept {
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;  // portable builds have sines of doubles alone
   for (Block& block : std::span(blocks).first(block_count)) {
-    solver.computeDirect(block.pushed);
-    const Eigen::Array3f shares =
-        1 + static_cast<float>(inverse_diagonal[block.place]) * solver.eigenvalues().array().max(0);
-    block.scale = solver.eigenvectors() * shares.rsqrt().matrix().asDiagonal() * solver.eigenvectors().transpose();
+    solver.computeDirect(block.pushed.cast<double>());
+    const Eigen::Vector3d shares =
+        (1 + inverse_diagonal[block.place] * solver.eigenvalues().array().max(0)).sqrt().inverse();
+    block.scale =
+        (solver.eigenvectors() * shares.asDiagonal() * solver.eigenvectors().transpose()).eval().cast<float>();
   }
 }
 
