@@ -164,7 +164,7 @@ class Teams {
 
 Scheduler host;
 
-// What the host has left when it returns, the caller does.
+// The caller does what the host has left when it returns.
 void run_on_host(const SharedLoop& loop) noexcept {
   struct Shared {
     const SharedLoop& loop;

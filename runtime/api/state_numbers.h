@@ -91,7 +91,7 @@ class StateReader {
   bool checks() const noexcept { return !takes_; }
 
   std::span<const double> take(std::size_t count) { return take_within(farthest_.value_or(kMost), count); }
-  /// Of which `loads` from `first` on are forces.
+  /// The numbers hold forces: `loads` of them, from `first` on.
   std::span<const double> take(std::size_t count, std::size_t first, std::size_t loads) {
     const auto taken = take_within(kMost, count);
     require_within(farthest_.value_or(kMost), taken.first(first));

@@ -50,7 +50,7 @@ class TrajectoryReader {
                            const std::string& advice = "") const;
 
  private:
-  /// That of the run or of the body; nothing where it has none. Refuses another type.
+  /// The attribute of the run or of the body; nothing where it has none. Refuses another type.
   template <typename Value>
   std::optional<Value> attribute(const std::string& name, const char* expected) const;
   Hdf5Dataset open_dataset(const std::string& path);

@@ -394,7 +394,8 @@ class Calls {
     if (choices_.one_in(8)) exmat_world_destroy(exmat_body_world(choices_.of(alone_)));  // a body's own: nothing
   }
 
-  /// The state has finite numbers, and the body takes it again unless a coordinate or a velocity of it is beyond 1e30.
+  /// The state has finite numbers, and the body takes it again; one with numbers above 1e30, as of a body that flies
+  /// off, it may refuse.
   void check_state(exmat_body* body) {
     std::vector<double> numbers(static_cast<std::size_t>(exmat_body_state_size(body)));
     if (exmat_body_read_state(body, numbers.data(), std::ssize(numbers)) != EXMAT_OK) fault("reading a state");

@@ -37,7 +37,7 @@ class FreeFrame final : public BodyFrame {
   double kinetic_energy(const Eigen::VectorXd& v, const FrameState& state) const noexcept override;
   double potential_energy(const Eigen::Vector3d& gravity, const FrameState& state) const noexcept override;
   Coordinates coordinates(const FrameState& state) const noexcept override;
-  /// Of those numbers the force and the torque of a host.
+  /// The force and the torque of a host stand here among the numbers of a state.
   static constexpr std::size_t kFirstLoad = 16, kLoads = 6;
   std::size_t write_numbers(const FrameState& state, double* to) const noexcept override;
   void set_numbers(std::span<const double> numbers, FrameState& state) const noexcept override;
