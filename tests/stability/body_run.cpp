@@ -55,10 +55,10 @@ class Stepper {
 class Run {
  public:
   Run(const StabilityCase& test, const StudyBody& body, int most_steps, const runtime::NewtonPolicy& policy)
-      : test_(test), body_(body), model_(*body.model), policy_(policy), steps_(most_steps) {
+      : test_(test), body_(body), model_(*body.model), policy_(policy), most_steps_(most_steps), steps_(most_steps) {
     make_scene();
     make_start();
-    plan_steps(most_steps);
+    plan_steps();
   }
 
   StabilityResult finish();
@@ -69,7 +69,8 @@ class Run {
   void add_ground();
   void make_start();
   Eigen::VectorXd start_pose() const;
-  void plan_steps(int most_steps);
+  void plan_steps();
+  void go_on_after_rest(bool was_at_rest);
   void step_all();
   void watch(const runtime::StepReport& report, const Eigen::VectorXd& before);
   double linear_displacement() const;
@@ -101,7 +102,8 @@ class Run {
   const StudyBody& body_;
   const runtime::Model& model_;
   const runtime::NewtonPolicy policy_;
-  std::int64_t steps_;
+  const std::int64_t most_steps_;
+  std::int64_t steps_, rest_steps_ = 0;
   bool expects_rest_ = false;
   runtime::StepScene scene_;
   runtime::State state_;
@@ -280,17 +282,27 @@ void Run::make_start() {
 }
 
 // Until the slowest mode is at rest after the load, if that is soon enough.
-void Run::plan_steps(int most_steps) {
+void Run::plan_steps() {
   if (!(test_.damping > 0)) {
-    steps_ = std::min(most_steps, kUndampedSteps);
+    steps_ = std::min<std::int64_t>(most_steps_, kUndampedSteps);
     return;
   }
   double rate = body_.lowest_frequency * std::min(test_.damping, 1 / (2 * test_.damping));
   if (test_.ground != Ground::kNone) rate = std::min(rate, std::sqrt(test_.contact_stiffness / surface_density()));
-  const double load_steps = test_.ground == Ground::kPress ? 2 * kLoadSteps : kLoadSteps;
-  const double needed = load_steps + std::max<double>(kLeastRestSteps, kRestTime / (rate * test_.time_step));
-  expects_rest_ = needed <= most_steps && !tumbles();
-  steps_ = needed <= most_steps ? static_cast<std::int64_t>(std::ceil(needed)) : most_steps;
+  const int load_steps = test_.ground == Ground::kPress ? 2 * kLoadSteps : kLoadSteps;
+  const double rest_steps = std::ceil(std::max<double>(kLeastRestSteps, kRestTime / (rate * test_.time_step)));
+  const bool ends = load_steps + rest_steps <= static_cast<double>(most_steps_);
+  expects_rest_ = ends && !tumbles();
+  if (!ends) return;
+  rest_steps_ = static_cast<std::int64_t>(rest_steps);
+  steps_ = load_steps + rest_steps_;
+}
+
+// A body that lies still in a shape that is not its lowest, pressed inside out, may leave it in any step: from there it
+// has its time again.
+void Run::go_on_after_rest(bool was_at_rest) {
+  if (!expects_rest_ || !was_at_rest || record_.is_at_rest()) return;
+  steps_ = std::clamp(record_.steps + rest_steps_, steps_, most_steps_);
 }
 
 // Kinetic energy of what comes to rest: the deformation, and all of a body that may touch the ground.
@@ -375,7 +387,9 @@ void Run::step_all() {
       record_.add({.non_finite = 1});
       break;
     }
+    const bool was_at_rest = record_.is_at_rest();
     watch(report, before);
+    go_on_after_rest(was_at_rest);
   }
   result_.seconds = timer.seconds();
   result_.steps = record_.steps;

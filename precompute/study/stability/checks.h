@@ -55,6 +55,7 @@ struct RunRecord {
 
   /// False where a state is not finite: the run ends.
   bool add(const StepFacts& step);
+  bool is_at_rest() const { return kinetic <= kRestKinetic * peak_kinetic; }
 };
 
 /// The largest displacement that is plausible, over the body's size. `linear`: what start and loads can do in linear

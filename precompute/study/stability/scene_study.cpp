@@ -78,8 +78,6 @@ struct Momenta {
   }
 };
 
-bool is_at_rest(const RunRecord& run) { return run.kinetic <= kRestKinetic * run.peak_kinetic; }
-
 class Runner {
  public:
   Runner(const Traits& traits, const std::vector<BodyScale>& scales, SceneBodies& bodies, bool own_start)
@@ -170,7 +168,7 @@ void Runner::run(std::int64_t steps, bool to_rest, Advance advance, SceneRun& ru
   const bool has_gravity = !kind(0).scene.gravity.isZero(0);
   expected.momentum &= start && start->angular_size + start->linear_size > 0;
   std::vector<Eigen::VectorXd> before(static_cast<std::size_t>(bodies_.count()));
-  while (record.steps < steps || (to_rest && !is_at_rest(record) && record.steps < kPatience * steps)) {
+  while (record.steps < steps || (to_rest && !record.is_at_rest() && record.steps < kPatience * steps)) {
     for (int i = 0; i < bodies_.count(); ++i) before[static_cast<std::size_t>(i)] = bodies_.state(i).q;
     const SceneBodies::Step done = bodies_.step();
     advance();
@@ -293,7 +291,7 @@ SceneStudy study_scene(const std::filesystem::path& file, int jobs) {
   };
   make(0, false);
   const SceneRun& own_run = study.runs.front();
-  const bool to_rest = own_run.record.non_finite == 0 && own_run.record.peak_kinetic > 0 && is_at_rest(own_run.record);
+  const bool to_rest = own_run.record.non_finite == 0 && own_run.record.peak_kinetic > 0 && own_run.record.is_at_rest();
   const bool several = bodies.count() > 1;  // whose steps share the threads
   std::exception_ptr failure;
 #pragma omp parallel for schedule(dynamic) num_threads(several ? 1 : jobs)
