@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <numbers>
 
 #include "common/core/error.h"
 #include "common/mesh/geometry.h"
@@ -101,7 +102,7 @@ class ExampleFrames : public testing::Test {
   precompute::ObjectInput object_;
   ExampleInput input_;
   std::vector<std::string> warnings_;
-  const Eigen::Matrix3d up_ = Eigen::AngleAxisd(M_PI / 2, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  const Eigen::Matrix3d up_ = Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitX()).toRotationMatrix();
 };
 
 // The pull-back interpolates linearly between the rest example's vertices: 1.2 % measured.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace exmat::test {
 namespace {
@@ -17,7 +18,7 @@ double smooth_step(double x) {
 }
 
 Eigen::Matrix3d turn(char axis, double degrees) {
-  return Eigen::AngleAxisd(degrees * M_PI / 180, Vector3d::Unit(axis - 'x')).toRotationMatrix();
+  return Eigen::AngleAxisd(degrees * std::numbers::pi / 180, Vector3d::Unit(axis - 'x')).toRotationMatrix();
 }
 
 struct Bone {
@@ -103,7 +104,7 @@ double box_distance(const Vector3d& x, const Vector3d& low, const Vector3d& high
 // `across`.
 Pose rolled(int across, double half, double degrees) {
   return [=](const Vector3d& x) {
-    const double angle = degrees * M_PI / 180, radius = 2 * half / angle, at = x[across] / radius;
+    const double angle = degrees * std::numbers::pi / 180, radius = 2 * half / angle, at = x[across] / radius;
     Vector3d y = x;
     y[across] = (radius - x[2]) * std::sin(at);
     y[2] = radius - (radius - x[2]) * std::cos(at);
@@ -113,7 +114,7 @@ Pose rolled(int across, double half, double degrees) {
 
 Pose twisted(int along, double half, double degrees) {
   return [=](const Vector3d& x) {
-    const double angle = degrees * M_PI / 180 * x[along] / (2 * half);
+    const double angle = degrees * std::numbers::pi / 180 * x[along] / (2 * half);
     return Vector3d(Eigen::AngleAxisd(angle, Vector3d::Unit(along)) * x);
   };
 }
@@ -196,7 +197,8 @@ PosableBody letter_c_body(const Proportions& proportions, double strength) {
   const double radius = 0.6 * proportions.length, thick = 0.12 * proportions.girth, half = 0.1 * proportions.girth;
   std::vector<Bone> bones;
   const auto at = [&](double degrees) {
-    return Vector3d(-radius * std::cos(degrees * M_PI / 180), radius * std::sin(degrees * M_PI / 180), 0);
+    return Vector3d(-radius * std::cos(degrees * std::numbers::pi / 180),
+                    radius * std::sin(degrees * std::numbers::pi / 180), 0);
   };
   for (const double side : {1.0, -1.0})
     for (int k = 0; k < kSide; ++k)

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <numbers>
 #include <random>
 #include <vector>
 
@@ -107,7 +108,7 @@ inline Pose twist(double length, double angle) {
 /// stay plane.
 inline Pose s_bend(double length, double angle) {
   return [=](const Eigen::Vector3d& x) {
-    const auto slope = [&](double s) { return angle * (1 + std::cos(2 * M_PI * s / length)) / 2; };
+    const auto slope = [&](double s) { return angle * (1 + std::cos(2 * std::numbers::pi * s / length)) / 2; };
     constexpr int kSteps = 64;
     const double step = x[0] / kSteps;
     double along = 0, up = 0;  // Simpson

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <fstream>
 #include <iostream>
+#include <numbers>
 #include <vector>
 
 #include "common/core/error.h"
@@ -52,7 +53,7 @@ TetMesh bar(const std::array<int, 3>& cells, double height, std::uint32_t seed) 
 
 const std::vector<Body>& bodies() {
   const std::array<int, 3> a{16, 5, 4}, b{14, 4, 4}, c{15, 5, 3}, d{16, 6, 6}, e{13, 5, 5};
-  const double radius = 1 / std::sqrt(M_PI);
+  const double radius = 1 / std::sqrt(std::numbers::pi);
   static const std::vector<Body> all{
       {"rectangular bar", bar(a, 0.6, 1), bar(b, 0.6, 2), bar(c, 0.6, 3), a, b, c},
       {"square bar", bar(a, 1, 1), bar(b, 1, 2), bar(c, 1, 3), a, b, c},

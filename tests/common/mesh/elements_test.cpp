@@ -56,7 +56,7 @@ TEST_F(SmoothedElements, AreOneRingForEachVertexWithAQuarterOfTheVolumeOfItsTets
   for (Eigen::Index e = 0; e < all.count(); ++e) {
     double volume = 0;
     for (Eigen::Index t = 0; t < mesh_.tet_count(); ++t)
-      if ((mesh_.tets.row(t).array() == e).any()) volume += volumes[t] / 4;
+      if ((mesh_.tets.row(t).array() == static_cast<std::int32_t>(e)).any()) volume += volumes[t] / 4;
     EXPECT_NEAR(all.volumes[e], volume, kRounding);
   }
 }

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <numbers>
 #include <vector>
 
 #include "common/mesh/geometry.h"
@@ -114,7 +115,7 @@ TEST(AlignPose, UnknownFrameOfASymmetricBodyIsAmbiguousUnlessThereAreLandmarks) 
 TEST(AlignPose, AFarBendInAnUnknownFrameIsAnsweredAndSaidToBeAmbiguous) {
   for (const double degrees : {200.0, 250.0})
     for (const std::uint32_t seed : {1U, 2U}) {
-      const auto pose = test::bend(kLength, degrees * M_PI / 180);
+      const auto pose = test::bend(kLength, degrees * std::numbers::pi / 180);
       const TetMesh rest = bar({12, 4, 3}, 0.2, seed), posed = bar({11, 3, 3}, 0.2, seed + 7);
       const Result result = align(rest, test::posed(posed, pose), pose, {true, {}, false});
       EXPECT_TRUE(result.alignment.positions.allFinite());

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <gtest/gtest.h>
+#include <numbers>
 #include <utility>
 
 #include "precompute/alignment/aligned_shape.h"
@@ -38,7 +39,8 @@ TEST(RigidFitter, FindsTurnsByRightAnglesExactly) {
   const std::array<std::pair<int, double>, 3> turns{{{0, 90}, {1, -90}, {2, 180}}};
   for (const auto& [axis, degrees] : turns) {
     const Eigen::Matrix3d turn =
-        Eigen::AngleAxisd(degrees * M_PI / 180, Eigen::Vector3d(Eigen::Vector3d::Unit(axis))).toRotationMatrix();
+        Eigen::AngleAxisd(degrees * std::numbers::pi / 180, Eigen::Vector3d(Eigen::Vector3d::Unit(axis)))
+            .toRotationMatrix();
     const RigidFitter fitter(surface_of(turned(other_mesh(), turn)), surface_of(object()));
     const auto fits = fitter.fits(false);
     EXPECT_LE((fits.front().rotation - turn.transpose()).norm(), 1e-12) << degrees;
@@ -85,7 +87,8 @@ TEST(RigidFitter, SaysHowMuchOfASurfaceTheOtherLacks) {
 
 TEST(DescribeTurn, NamesAxisAndAngleOfTheBodyThatIsTurnedBack) {
   const auto of = [](double degrees, const Eigen::Vector3d& axis) {
-    return describe_turn(Eigen::AngleAxisd(degrees * M_PI / 180, axis.normalized()).toRotationMatrix().transpose());
+    return describe_turn(
+        Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis.normalized()).toRotationMatrix().transpose());
   };
   EXPECT_EQ(of(90, {1, 0, 0}), "turned by 90 degrees about x");
   EXPECT_EQ(of(-90, {0, 1, 0}), "turned by -90 degrees about y");

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <gtest/gtest.h>
+#include <numbers>
 
 #include "precompute/full_space/mesh_elasticity.h"
 #include "precompute/shape_space/filter_functions.h"
@@ -280,7 +281,7 @@ TEST(Skeleton, HoldsVerticesExactlyAtTheirBones) {
     return worst;
   };
   for (int i = 0; i < 60; ++i) {
-    const double turn = 4 * M_PI * 0.004 * i;
+    const double turn = 4 * std::numbers::pi * 0.004 * i;
     const Eigen::Quaterniond own(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitY()));
     runtime::BonePoses poses = bent(*body.model->skeleton, 0.1, Eigen::Vector3d::Zero());
     for (runtime::BonePose& pose : poses)

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <gtest/gtest.h>
+#include <numbers>
 #include <set>
 #include <utility>
 
@@ -145,7 +146,7 @@ TEST(MovementBound, TellsTheMostThatWeightsMayHave) {
     double most = 0;
     constexpr int kDirections = 100'000;
     for (int i = 0; i < kDirections; ++i) {
-      const double angle = 0.5 * M_PI * i / (kDirections - 1);
+      const double angle = 0.5 * std::numbers::pi * i / (kDirections - 1);
       const Eigen::Vector2d direction(std::cos(angle), std::sin(angle));
       most = std::max(most, weights.dot(direction) * 0.7 / bound.of(direction));
     }
