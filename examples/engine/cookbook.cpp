@@ -139,6 +139,15 @@ void take_pose(exmat::BodyRef body, const exmat::Model& model, std::size_t examp
 
 void forget_pose(exmat::BodyRef body) { body.set_example_weights({}); }  // weights follow the shape again
 
+// recipe: touches
+/// A sound for each two bodies that began to touch in the last call of step(); returns how many.
+int hear(const exmat::World& world) {
+  int sounds = 0;
+  for (const exmat_touch& touch : world.touches())
+    if (touch.change == EXMAT_TOUCH_BEGINS && touch.obstacle < 0) ++sounds;  // of touch.body and touch.other
+  return sounds;
+}
+
 // recipe: coupling
 /// A rigid ball of the host's own engine: exmat is told where it is, and says how hard it is pushed.
 struct Ball {
@@ -301,8 +310,10 @@ int main(int argc, char** argv) {
       drawn.update(world.body(upper));
     };
 
-    frames(60, [] {});
+    int sounds = 0;
+    frames(60, [&] { sounds += hear(world); });
     std::printf("dropped      the upper body at z = %.2f m\n", world.body(upper).motion().position[2]);
+    std::printf("heard        %s\n", sounds > 0 ? "the bodies meet" : "nothing");
     History history(8);
     history.save(world, 0);
     const std::uint64_t saved = world.hash();

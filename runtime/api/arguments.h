@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <vector>
 
 #include "runtime/api/failures.h"
 #include "runtime/api/settings.h"
@@ -59,6 +60,20 @@ template <typename Struct>
 void give_entry(const Struct& from, std::size_t size, void* to) noexcept {
   if (size > sizeof from) std::memset(to, 0, size);
   std::memcpy(to, &from, std::min(size, sizeof from));
+}
+
+/// All of a list to a caller's array of `count` structs of `size` bytes.
+template <typename Struct>
+exmat_status give_list(const char* function, const std::vector<Struct>& list, const StructSizes& sizes, Struct* to,
+                       std::int64_t count, std::size_t size) noexcept {
+  if (const exmat_status status = check_size(function, size, sizes)) return status;
+  if (count != std::ssize(list)) return wrong_length(function, "count", count, std::ssize(list));
+  auto* entry = reinterpret_cast<unsigned char*>(to);
+  for (const Struct& from : list) {
+    give_entry(from, size, entry);
+    entry += size;
+  }
+  return EXMAT_OK;
 }
 
 /// Members that the caller's version has come from `given`, the others from `known`.

@@ -121,6 +121,18 @@ exmat_status exmat_surface_read_vertices(const exmat_surface* surface, std::int6
   return EXMAT_OK;
 }
 
+exmat_status exmat_surface_read_normals(const exmat_surface* surface, const float* xyz, float* normals,
+                                        std::int64_t coordinates) noexcept {
+  EXMAT_REQUIRE(surface);
+  EXMAT_REQUIRE(xyz);
+  EXMAT_REQUIRE(normals);
+  const Eigen::Index points = surface->points.set.positions.points();
+  EXMAT_REQUIRE_LENGTH(coordinates, 3 * points);
+  const auto length = static_cast<std::size_t>(coordinates);
+  surface->drawn.normals.read({xyz, length}, {normals, length});
+  return EXMAT_OK;
+}
+
 exmat_status exmat_points_create_on_surface(const exmat_surface* surface, const std::int64_t* triangles,
                                             const double* shares, std::int64_t count, exmat_points** points) noexcept {
   EXMAT_REQUIRE(points);

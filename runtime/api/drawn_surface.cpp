@@ -71,6 +71,7 @@ ReadSurface surface_of_object(const ReducedModel& data) {
   for (Eigen::Index i = 0; i < rest.rows(); ++i) rest.row(i) = object.mesh.vertices.row(drawn.vertices[i]);
   surface.points = embedded_points(basis, rest, drawn.vertices, RowMatrix::Ones(rest.rows(), 1));
   drawn.density = DensityField(object, basis, shares_by_volume(object.mesh, drawn.vertices));
+  drawn.normals = VertexNormals(rest, drawn.triangles);
   return surface;
 }
 
@@ -94,6 +95,7 @@ ReadSurface surface_of_render_mesh(const ReducedModel& data) {
     for (int c = 0; c < 4; ++c) rest.row(i) += render.barycentric(i, c) * object.mesh.vertices.row(corners(i, c));
   surface.points = embedded_points(basis, rest, corners, render.barycentric);
   surface.drawn.density = DensityField(object, basis, shares);
+  surface.drawn.normals = VertexNormals(render.vertices, render.triangles);
   return surface;
 }
 

@@ -7,6 +7,7 @@
 #include "common/core/arrays.h"
 #include "common/elastic/material.h"
 #include "common/elastic/material_model.h"
+#include "common/mesh/vertex_normals.h"
 #include "runtime/api/point_set.h"
 
 namespace exmat::runtime {
@@ -50,6 +51,7 @@ struct ModelSurface {
   TriangleArray triangles;  ///< f x 3, of the points
   IndexVector vertices;     ///< k, of the object: the point itself, or the nearest to it at rest
   DensityField density;
+  VertexNormals normals;
 };
 
 struct ReadSurface {

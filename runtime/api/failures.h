@@ -14,13 +14,21 @@ class InvalidArgument : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+// On Windows the name printf stands for another language of formats than the one that is used there, too.
+#if defined __MINGW32__
+#define EXMAT_PRINTF gnu_printf
+#else
+#define EXMAT_PRINTF printf
+#endif
+
 /// Keeps the message for exmat_last_error(), cut to what fits, and returns `status`. No allocation.
-[[gnu::format(printf, 2, 3)]] exmat_status fail(exmat_status status, const char* format, ...) noexcept;
+[[gnu::format(EXMAT_PRINTF, 2, 3)]] exmat_status fail(exmat_status status, const char* format, ...) noexcept;
 
 /// This thread's last message.
 const char* last_failure() noexcept;
 
-/// Runs what may throw; `function` is the C function that does so.
+/// Runs what may throw; `function` is the C function that does so. Messages name no other function: those of C++ and
+/// Python, which pass them on, have other names.
 template <typename Action>
 exmat_status guarded(const char* function, Action&& action) noexcept {
   try {

@@ -21,6 +21,7 @@ inline constexpr StructSizes kContactSizes{96, sizeof(exmat_contact)};
 inline constexpr StructSizes kContactLawSizes{40, sizeof(exmat_contact_law)};
 inline constexpr StructSizes kWorldReportSizes{72, sizeof(exmat_world_report)};
 inline constexpr StructSizes kBodyContactSizes{104, sizeof(exmat_body_contact)};
+inline constexpr StructSizes kTouchSizes{32, sizeof(exmat_touch)};
 inline constexpr StructSizes kBundleInfoSizes{72, sizeof(exmat_bundle_info)};
 inline constexpr StructSizes kProfileSizes{48, sizeof(exmat_profile)};
 inline constexpr StructSizes kAttachmentSizes{offsetof(exmat_attachment, break_force) + sizeof(double),

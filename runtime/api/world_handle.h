@@ -4,6 +4,7 @@
 #include <string>
 
 #include "runtime/api/handles.h"
+#include "runtime/api/touches.h"
 #include "runtime/sim/world/world.h"
 
 // NOLINTBEGIN(readability-identifier-naming): its name is the API's.
@@ -37,6 +38,7 @@ struct exmat_world {
   std::int64_t next_obstacle = 0;
   std::int64_t steps = 0;                    ///< its time over the time step
   std::vector<exmat_body_contact> contacts;  ///< at the end of the last step
+  exmat::runtime::Touches touches;           ///< in the last call that stepped it
   bool profiled = false;
   exmat::runtime::WorldProfile profile;  ///< profile of the last call that stepped it, where it is profiled
   /// Surfaces of the models whose bodies were ever in it.

@@ -89,6 +89,7 @@ exmat_world_report advance(exmat_world& world, std::int64_t steps, int threads) 
   world.profile = {};
   world.world.set_profile(world.profiled ? &world.profile : nullptr);
   for (const auto& member : world.members) begin_steps(*member.body);
+  world.touches.begin(world);
   while (report.steps < steps && failed_of(world) == nullptr) {
     for (const auto& member : world.members) {
       apply_keys(*member.body);
@@ -101,6 +102,7 @@ exmat_world_report advance(exmat_world& world, std::int64_t steps, int threads) 
   if (failed_of(world) != nullptr) --report.steps;
   for (const auto& member : world.members) world.steps = std::max(world.steps, member.body->state.step);
   keep_contacts(world);
+  world.touches.end(world);
   for (const auto& member : world.members) measure_lost_work(*member.body);
   report.seconds = timer.seconds();
   for (const auto& member : world.members) member.body->report.seconds = report.seconds;
@@ -182,16 +184,19 @@ std::int64_t exmat_world_contacts(const exmat_world* world) noexcept {
 exmat_status exmat_world_read_contacts(const exmat_world* world, exmat_body_contact* contacts, std::int64_t count,
                                        std::size_t size) noexcept {
   EXMAT_REQUIRE(world);
-  if (const exmat_status status = check_size(__func__, size, kBodyContactSizes)) return status;
-  EXMAT_REQUIRE_LENGTH(count, world->contacts.size());
-  if (count == 0) return EXMAT_OK;
-  EXMAT_REQUIRE(contacts);
-  auto* to = reinterpret_cast<unsigned char*>(contacts);
-  for (const exmat_body_contact& contact : world->contacts) {
-    give_entry(contact, size, to);
-    to += size;
-  }
-  return EXMAT_OK;
+  if (count > 0) EXMAT_REQUIRE(contacts);
+  return give_list(__func__, world->contacts, kBodyContactSizes, contacts, count, size);
+}
+
+std::int64_t exmat_world_touches(const exmat_world* world) noexcept {
+  return world != nullptr ? std::ssize(world->touches.changes()) : -1;
+}
+
+exmat_status exmat_world_read_touches(const exmat_world* world, exmat_touch* touches, std::int64_t count,
+                                      std::size_t size) noexcept {
+  EXMAT_REQUIRE(world);
+  if (count > 0) EXMAT_REQUIRE(touches);
+  return give_list(__func__, world->touches.changes(), kTouchSizes, touches, count, size);
 }
 
 exmat_status exmat_world_read_energies(const exmat_world* world, exmat_energies* result) noexcept {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "common/core/arrays.h"
+#include "common/mesh/vertex_normals.h"
 #include "runtime/export/drawn_surface.h"
-#include "runtime/export/vertex_normals.h"
 
 namespace exmat::runtime {
 

@@ -22,6 +22,14 @@ std::shared_ptr<PointsObject> points_on(const SurfaceObject& surface, const py::
                                         surface.model.shared());
 }
 
+py::array_t<float> normals_at(const SurfaceObject& surface,
+                              const py::array_t<float, py::array::c_style | py::array::forcecast>& positions) {
+  require_shape(positions, "positions", {static_cast<py::ssize_t>(surface.count), 3});
+  py::array_t<float> normals({static_cast<py::ssize_t>(surface.count), py::ssize_t{3}});
+  surface.surface.read_normals({positions.data(), static_cast<std::size_t>(positions.size())}, span_of(normals));
+  return normals;
+}
+
 py::array surface_positions(BodyObject& body, const SurfaceObject& surface, const py::object& out) {
   return positions_of(body, surface.surface, surface.count, out);
 }
@@ -125,6 +133,9 @@ void bind_surface(py::module_& module) {
             return array_of(surface.surface.basis(modes), {surface.count, 3, modes});
           },
           "U of its points, which are at R (X + U q) + t: shape (k, 3, r), float32 [kg^(-1/2)].")
+      .def("normals", &normals_at, py::arg("positions"),
+           "Unit normals of its points at positions of shape (k, 3) [m]: float32 of the same shape. Points at one "
+           "place, as along the seams of a texture, share theirs unless an edge of more than 60 degrees is there.")
       .def("points", &points_on, py::arg("triangles"), py::arg("shares"),
            "Points on triangles of it, of numbers of shape (k,), at the corners' `shares` of shape (k, 3) and sum 1.");
 }

@@ -96,9 +96,9 @@ py::array_t<std::int64_t> ids(const WorldObject& world) {
 
 // ---- steps, and what is read
 
-py::array_t<exmat_body_contact> contacts(WorldObject& world) {
-  const std::vector<exmat_body_contact> contacts = world.get().contacts();
-  return py::array_t<exmat_body_contact>(static_cast<py::ssize_t>(contacts.size()), contacts.data());
+template <typename Struct>
+py::array_t<Struct> structured(const std::vector<Struct>& list) {
+  return py::array_t<Struct>(static_cast<py::ssize_t>(list.size()), list.data());
 }
 
 void set_law(WorldObject& world, std::optional<double> stiffness, std::optional<double> damping,
@@ -293,6 +293,7 @@ void restore_world(WorldObject& world, const py::dict& kept) {
 
 WorldClass bind_world(py::module_& module) {
   PYBIND11_NUMPY_DTYPE(exmat_body_contact, body, other, vertex, position, normal, force, depth);
+  PYBIND11_NUMPY_DTYPE(exmat_touch, body, other, obstacle, change);
   bind_world_state(module);
   WorldClass type(module, "World", "The base of exmat.World.");
   type.def(py::init(&empty_world), py::arg("stiffness"), py::arg("damping"), py::arg("friction"),
@@ -343,10 +344,16 @@ WorldClass bind_world(py::module_& module) {
       .def_property_readonly(
           "report", [](WorldObject& world) { return world.get(), world.report; },
           "WorldReport of the last call that stepped, also where it raised.")
-      .def_property_readonly("contacts", &contacts,
-                             "Vertices that touched another body, or their own, at the end of the last step, a "
-                             "structured array of shape (count,): body, other (ids), vertex, position [m], normal "
-                             "(away from the other), force on the body [N] and depth [m]. A copy.")
+      .def_property_readonly(
+          "contacts", [](WorldObject& world) { return structured(world.get().contacts()); },
+          "Vertices that touched another body, or their own, at the end of the last step, a "
+          "structured array of shape (count,): body, other (ids), vertex, position [m], normal "
+          "(away from the other), force on the body [N] and depth [m]. A copy.")
+      .def_property_readonly(
+          "touches", [](WorldObject& world) { return structured(world.get().touches()); },
+          "Who touched before the last call that stepped, or after it, a structured array of shape "
+          "(count,): body, other (ids; body where it touches itself, -1 of an obstacle), obstacle "
+          "(its id, else -1) and change: 0 began, 1 stays, 2 ended. A copy.")
       .def_property_readonly(
           "energies", [](WorldObject& world) { return world.get().energies(); }, "Of all bodies together.")
       .def_property_readonly(

@@ -637,6 +637,9 @@ class Calls {
         const std::size_t size = choices_.one_in(8) ? choices_.below(kStructBytes) : sizeof(exmat_body_contact);
         checked(exmat_world_read_contacts(all, reinterpret_cast<exmat_body_contact*>(contacts.data()),
                                           choices_.length(count), size));
+        const std::int64_t touched = std::clamp<std::int64_t>(exmat_world_touches(all), 0, 20);
+        std::vector<exmat_touch> touches(static_cast<std::size_t>(touched + 1));
+        checked(exmat_world_read_touches(all, touches.data(), choices_.length(touched), sizeof(exmat_touch)));
         return;
       }
       case 5: {

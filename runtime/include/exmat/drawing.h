@@ -54,6 +54,12 @@ EXMAT_API const exmat_points* exmat_surface_points(const exmat_surface* surface)
 EXMAT_API exmat_status exmat_surface_read_vertices(const exmat_surface* surface, int64_t* vertices,
                                                    int64_t count) EXMAT_NOEXCEPT;
 
+/* Unit `normals` [coordinates = 3k] of its points at the positions `xyz` [3k], in whichever frame these are: the sum of
+   the vector areas about each. Points at one place, as along the seams of a texture, have the same unless their own
+   differ by more than 60 degrees at rest. Allocates nothing; reads no file. */
+EXMAT_API exmat_status exmat_surface_read_normals(const exmat_surface* surface, const float* xyz, float* normals,
+                                                  int64_t coordinates) EXMAT_NOEXCEPT;
+
 /* k points on triangles of a surface, one on each of `triangles` [count = k], k >= 1, at the corners' `shares`
    [3 count], which add up to 1. Reads no file. */
 EXMAT_API exmat_status exmat_points_create_on_surface(const exmat_surface* surface, const int64_t* triangles,

@@ -49,6 +49,12 @@ class Surface {
     check(exmat_surface_read_vertices(get(), ids.data(), static_cast<std::int64_t>(ids.size())));
     return ids;
   }
+  /// Reads unit normals [3k] at positions `xyz` [3k].
+  void read_normals(std::span<const float> xyz, std::span<float> normals) const {
+    if (xyz.size() != normals.size())
+      throw Error(EXMAT_INVALID_ARGUMENT, "read_normals: expected as many positions as normals");
+    check(exmat_surface_read_normals(get(), xyz.data(), normals.data(), detail::length(normals)));
+  }
   /// [3k] X, at rest.
   std::vector<double> rest() const {
     std::vector<double> xyz(3 * points());

@@ -138,6 +138,23 @@ EXMAT_API int64_t exmat_world_contacts(const exmat_world* world) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_world_read_contacts(const exmat_world* world, exmat_body_contact* contacts, int64_t count,
                                                  size_t size) EXMAT_NOEXCEPT;
 
+/* What touched before the last call that stepped the world, or after it. A body that fell asleep goes on touching; what
+   was put elsewhere, added or taken out since the call before has no touch that ends. */
+enum { EXMAT_TOUCH_BEGINS = 0, EXMAT_TOUCH_STAYS = 1, EXMAT_TOUCH_ENDS = 2 };
+typedef struct exmat_touch {
+  int64_t body;     /* ids */
+  int64_t other;    /* > body, or body where it touches itself; -1 of an obstacle */
+  int64_t obstacle; /* -1 of another body */
+  int32_t change;   /* EXMAT_TOUCH_BEGINS: after the call, not before it */
+  int32_t reserved; /* 0 */
+} exmat_touch;
+
+/* Number of touches; negative where `world` is NULL. And `touches` [count], in the order of their ids, obstacles last;
+   `size` is sizeof(exmat_touch). */
+EXMAT_API int64_t exmat_world_touches(const exmat_world* world) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_world_read_touches(const exmat_world* world, exmat_touch* touches, int64_t count,
+                                                size_t size) EXMAT_NOEXCEPT;
+
 /* Reads the energies of all bodies together. */
 EXMAT_API exmat_status exmat_world_read_energies(const exmat_world* world, exmat_energies* energies) EXMAT_NOEXCEPT;
 

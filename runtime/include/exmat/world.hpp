@@ -64,6 +64,12 @@ class WorldRef {
                                     sizeof(exmat_body_contact)));
     return contacts;
   }
+  std::vector<exmat_touch> touches() const {
+    std::vector<exmat_touch> touches(static_cast<std::size_t>(exmat_world_touches(get())));
+    check(exmat_world_read_touches(get(), touches.data(), static_cast<std::int64_t>(touches.size()),
+                                   sizeof(exmat_touch)));
+    return touches;
+  }
   exmat_energies energies() const {
     exmat_energies energies;
     energies.size = sizeof energies;

@@ -154,6 +154,88 @@ TEST_F(ApiWorldTest, ContactsAreEqualAndOppositeAndAddUpToTheLoadOfEachBody) {
   EXPECT_LE((velocity_of(world.body(0)) + velocity_of(world.body(1))).norm(), 1e-12);
 }
 
+using Touch = std::tuple<std::int64_t, std::int64_t, std::int64_t, std::int32_t>;
+
+std::vector<Touch> touches_of(const World& world) {
+  std::vector<Touch> touches;
+  for (const exmat_touch& touch : world.touches())
+    touches.emplace_back(touch.body, touch.other, touch.obstacle, touch.change);
+  return touches;
+}
+
+TEST_F(ApiWorldTest, ATouchBeginsStaysAndEnds) {
+  const Model model = this->model();
+  World world = collision(model);
+  std::string changes;
+  for (int i = 0; i < 60; ++i) {
+    world.step(1, 1);
+    const std::vector<Touch> touches = touches_of(world);
+    ASSERT_LE(touches.size(), 1u);
+    EXPECT_TRUE(world.contacts().empty() || !touches.empty());
+    if (touches.empty()) continue;
+    const auto [body, other, obstacle, change] = touches.front();
+    EXPECT_EQ(std::tuple(body, other, obstacle), std::tuple(0, 1, -1));
+    changes += static_cast<char>('0' + change);
+  }
+  EXPECT_THAT(changes, ::testing::MatchesRegex("01+2"));
+
+  // All of it in one call leaves nothing to tell, and an end needs what touched where the call began.
+  World again = collision(model);
+  again.step(60, 1);
+  EXPECT_TRUE(again.touches().empty());
+  World part = collision(model);
+  part.step(14, 1);
+  EXPECT_THAT(touches_of(part), ::testing::ElementsAre(Touch(0, 1, -1, EXMAT_TOUCH_BEGINS)));
+  part.step(46, 1);
+  EXPECT_THAT(touches_of(part), ::testing::ElementsAre(Touch(0, 1, -1, EXMAT_TOUCH_ENDS)));
+  Body out = part.remove(1);
+  EXPECT_TRUE(part.touches().empty());
+}
+
+TEST_F(ApiWorldTest, TouchesOfBodiesThatFallAsleepStay) {
+  exmat_settings settings = this->settings(9.81);
+  settings.mass_damping = 5;
+  settings.sleep_energy = 1e-3;
+  settings.sleep_time = 0.02;
+  const Model model(files_.folder() / "block.h5", settings);
+  World world(law());
+  world.add(body(model, at({0, 0, 0})));
+  world.add(body(model, at({0, 0, 0.2})));
+  exmat_obstacle floor = default_obstacle();
+  floor.stiffness = 1e7;
+  floor.damping = 2e4;
+  EXPECT_EQ(world.add_obstacle(floor), 0);
+  floor.point[2] = -1;
+  EXPECT_EQ(world.add_obstacle(floor), 1);
+  world.step(200, 1);
+  const Touch piled(0, 1, -1, EXMAT_TOUCH_STAYS), stands(0, -1, 0, EXMAT_TOUCH_STAYS);
+  bool slept = false;
+  for (int i = 0; i < 200; ++i) {
+    slept = world.step(1, 1).asleep == 2;
+    EXPECT_THAT(touches_of(world), ::testing::ElementsAre(piled, stands)) << i;
+  }
+  EXPECT_TRUE(slept);
+
+  // Rollback: what a world does again it tells again.
+  std::vector<std::uint64_t> snapshot;
+  world.save(snapshot);
+  const auto push = [&] {
+    exmat_motion up = world.body(1).motion();
+    up.linear_velocity[2] = 1;
+    world.body(1).set_motion(up);
+    world.step(10, 1);
+    return touches_of(world);
+  };
+  const std::vector<Touch> first = push();
+  EXPECT_THAT(first, ::testing::ElementsAre(stands));
+  world.restore(snapshot);
+  EXPECT_TRUE(world.touches().empty());
+  EXPECT_EQ(push(), first);
+  world.remove_obstacle(0);
+  world.step(1, 1);
+  EXPECT_TRUE(world.touches().empty());
+}
+
 TEST_F(ApiWorldTest, AStateTakesAWorldBackToTheLastBit) {
   const Model model = this->model(9.81);
   World world = collision(model);

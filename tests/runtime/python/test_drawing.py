@@ -51,6 +51,20 @@ def test_points_stand_where_rest_basis_and_placement_say(spinning):
     np.testing.assert_allclose(np.linalg.det(spinning.placement[:, :3]), 1, rtol=1e-12)
 
 
+def test_normals_are_sums_of_vector_areas(spinning):
+    surface = exmat.Surface(spinning.model)
+    xyz = spinning.positions(surface)
+    sums = np.zeros((len(surface), 3))
+    a, b, c = (xyz[surface.triangles[:, corner]].astype("f8") for corner in range(3))
+    for corner in range(3):
+        np.add.at(sums, surface.triangles[:, corner], np.cross(b - a, c - a))
+    normals = surface.normals(xyz)
+    assert normals.dtype == np.float32
+    np.testing.assert_allclose(normals, sums / np.linalg.norm(sums, axis=1)[:, None], rtol=0, atol=1e-5)  # 1 ulp of 3 m over edges of 0.1 m
+    with pytest.raises(exmat.InvalidArgument, match="positions"):
+        surface.normals(xyz[1:])
+
+
 # The basis of a surface is rounded to single precision, the positions are not.
 @pytest.mark.parametrize("step", [0, 100])
 def test_positions_in_double_precision_are_those_of_the_bundle(free_bundle, step):

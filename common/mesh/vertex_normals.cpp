@@ -1,4 +1,4 @@
-#include "runtime/export/vertex_normals.h"
+#include "common/mesh/vertex_normals.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -6,7 +6,7 @@
 #include <tuple>
 #include <utility>
 
-namespace exmat::runtime {
+namespace exmat {
 namespace {
 
 constexpr double kHardEdge = 0.5;       // cosine of the angle from which on an edge is one
@@ -58,19 +58,29 @@ VertexNormals::VertexNormals(const VertexArray& vertices, TriangleArray triangle
   }
 }
 
-VertexArray VertexNormals::area_sums(const VertexArray& positions) const {
-  VertexArray sums = VertexArray::Zero(positions.rows(), 3);
+template <class Positions, class Sums>
+void VertexNormals::set_area_sums(const Positions& positions, Sums& sums) const {
+  using Row = Eigen::Matrix<typename Sums::Scalar, 1, 3>;
+  sums.setZero();
   for (const auto corners : triangles_.rowwise()) {
-    const Eigen::RowVector3d from = positions.row(corners[0]);
-    const Eigen::RowVector3d area = (positions.row(corners[1]) - from).cross(positions.row(corners[2]) - from);
+    const Row from = positions.row(corners[0]);
+    const Row first = positions.row(corners[1]) - from, second = positions.row(corners[2]) - from;
+    const Row area = first.cross(second);
     for (const std::int32_t corner : corners) sums.row(corner) += area;
   }
+}
+
+VertexArray VertexNormals::area_sums(const VertexArray& positions) const {
+  VertexArray sums(positions.rows(), 3);
+  set_area_sums(positions, sums);
   return sums;
 }
 
-void VertexNormals::share(VertexArray& sums) const {
+template <class Sums>
+void VertexNormals::share(Sums& sums) const {
   for (const std::vector<Eigen::Index>& group : groups_) {
-    Eigen::RowVector3d sum = Eigen::RowVector3d::Zero();
+    Eigen::Matrix<typename Sums::Scalar, 1, 3> sum;
+    sum.setZero();
     for (const Eigen::Index vertex : group) sum += sums.row(vertex);
     for (const Eigen::Index vertex : group) sums.row(vertex) = sum;
   }
@@ -81,6 +91,15 @@ VertexArray VertexNormals::at(const VertexArray& positions) const {
   share(normals);
   for (auto normal : normals.rowwise()) normal = unit(normal);
   return normals;
+}
+
+void VertexNormals::read(std::span<const float> positions, std::span<float> normals) const noexcept {
+  using Rows = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;
+  const Eigen::Map<const Rows> from(positions.data(), std::ssize(positions) / 3, 3);
+  Eigen::Map<Rows> sums(normals.data(), from.rows(), 3);
+  set_area_sums(from, sums);
+  share(sums);
+  for (auto normal : sums.rowwise()) normal = unit(normal.template cast<double>()).template cast<float>();
 }
 
 RowMatrix VertexNormals::derivatives(const VertexArray& positions, const RowMatrix& displacements) const {
@@ -111,4 +130,4 @@ RowMatrix VertexNormals::derivatives(const VertexArray& positions, const RowMatr
   return derivatives;
 }
 
-}  // namespace exmat::runtime
+}  // namespace exmat
