@@ -11,7 +11,9 @@
 #include "common/core/decompositions.h"
 #include "common/core/timer.h"
 #include "runtime/sim/lanes/lane_step.h"
+#include "runtime/sim/space/full/full_body.h"
 #include "runtime/sim/step/stepper.h"
+#include "runtime/sim/world/world.h"
 
 namespace exmat::precompute {
 namespace {
@@ -22,12 +24,19 @@ constexpr double kRestTime = 20;       // over the rate of the slowest mode
 constexpr int kLeastRestSteps = 60, kUndampedSteps = 300;
 constexpr double kClearance = 0.02;  // between body and ground [m]
 
-/// Steps one body: by itself, or in mixed precision as one of instances, in a lane of its own. What is beside it there
-/// changes nothing, so nothing is. Where lanes leave a step to the body alone it is one in double precision.
+/// Steps one body: by itself, in mixed precision as one of instances, in a lane of its own, or in a world, where it may
+/// step in all vertices. What is beside it in lanes changes nothing, so nothing is. Where lanes leave a step to the
+/// body alone it is one in double precision.
 class Stepper {
  public:
-  Stepper(const runtime::Model& model, const runtime::StepScene& scene, const runtime::NewtonPolicy& policy)
-      : model_(model), scene_(scene) {
+  Stepper(const runtime::Model& model, const runtime::FullModel* full, const runtime::StepScene& scene,
+          const runtime::NewtonPolicy& policy, runtime::State& state)
+      : model_(model), scene_(scene), state_(state) {
+    if (scene.space.space != Space::kReduced) {
+      world_.emplace(runtime::ContactLaw());
+      world_->add({&model, &scene, nullptr, full}, state);
+      return;
+    }
     if (scene.precision == Precision::kMixed)
       lanes_.emplace(model, scene);
     else
@@ -37,10 +46,14 @@ class Stepper {
     if (workspace.near) workspace.near->newton.policy = policy;
   }
 
-  runtime::StepReport step(runtime::State& state) {
-    if (alone_) return runtime::step(model_, scene_, state, *alone_);
+  runtime::StepReport step() {
+    if (world_) {
+      world_->step(1);
+      return world_->report(0);
+    }
+    if (alone_) return runtime::step(model_, scene_, state_, *alone_);
     runtime::StepReport report;
-    const runtime::LaneBody body{&scene_, &state};
+    const runtime::LaneBody body{&scene_, &state_};
     runtime::step_in_lanes(model_, {&body, 1}, *lanes_, {&report, 1});
     return report;
   }
@@ -48,14 +61,22 @@ class Stepper {
  private:
   const runtime::Model& model_;
   const runtime::StepScene& scene_;
+  runtime::State& state_;
   std::optional<runtime::Workspace> alone_;
   std::optional<runtime::LaneWorkspace> lanes_;
+  std::optional<runtime::World> world_;
 };
 
 class Run {
  public:
   Run(const StabilityCase& test, const StudyBody& body, int most_steps, const runtime::NewtonPolicy& policy)
-      : test_(test), body_(body), model_(*body.model), policy_(policy), most_steps_(most_steps), steps_(most_steps) {
+      : test_(test),
+        body_(body),
+        model_(*body.model),
+        full_(test.space != Space::kReduced ? body.full.get() : nullptr),
+        policy_(policy),
+        most_steps_(most_steps),
+        steps_(most_steps) {
     make_scene();
     make_start();
     plan_steps();
@@ -75,12 +96,14 @@ class Run {
   void watch(const runtime::StepReport& report, const Eigen::VectorXd& before);
   double linear_displacement() const;
   double largest(const Eigen::VectorXd& q) const { return largest_displacement(body_.basis(), q); }
+  double displacement() const;
+  runtime::Energies energies() const { return runtime::energies(full_, model_, scene_, state_); }
+  Eigen::VectorXd coordinates() const;
   double kinetic() const;
   double rotation_energy() const;
-  Eigen::Vector3d angular_momentum() const {
-    return precompute::angular_momentum(runtime::DeformingInertia(*body_.reduced.rigid), state_);
-  }
+  Eigen::Vector3d angular_momentum() const;
   RowMatrix end_rows() const;
+  Eigen::VectorXd force_on_end(const Eigen::Vector3d& force) const;
   double surface_density() const {  // mass over the area that it lies on [kg/m^2]
     return test_.body.density * body_.reduced.object->mesh.vertices.col(2).maxCoeff();
   }
@@ -101,6 +124,7 @@ class Run {
   const StabilityCase& test_;
   const StudyBody& body_;
   const runtime::Model& model_;
+  const runtime::FullModel* const full_;  // null for one that steps in its modes alone
   const runtime::NewtonPolicy policy_;
   const std::int64_t most_steps_;
   std::int64_t steps_, rest_steps_ = 0;
@@ -117,6 +141,7 @@ void Run::make_scene() {
   scene_.time_step = test_.time_step;
   scene_.integrator = test_.integrator;
   scene_.precision = test_.precision;
+  scene_.space.space = test_.space;
   // Parts of a step would mend what a test breaks.
   if (!policy_.line_search || !policy_.projection)
     scene_.newton.max_iterations = runtime::NewtonSettings{}.max_iterations - 1;
@@ -142,6 +167,16 @@ RowMatrix Run::end_rows() const {
   return rows;
 }
 
+// Force on each vertex at the far end, of those that move.
+Eigen::VectorXd Run::force_on_end(const Eigen::Vector3d& force) const {
+  const VertexArray& X = body_.reduced.object->mesh.vertices;
+  const double end = X.col(0).maxCoeff() - 1e-9;
+  Eigen::VectorXd forces = Eigen::VectorXd::Zero(full_->space.size());
+  for (Eigen::Index v = 0; v < X.rows(); ++v)
+    if (X(v, 0) >= end) forces.segment<3>(3 * full_->space.number(v)) = force;
+  return forces;
+}
+
 void Run::add_tip_load() {
   const RowMatrix rows = end_rows();
   runtime::ScriptedForce load;
@@ -152,6 +187,7 @@ void Run::add_tip_load() {
   const double count = static_cast<double>(rows.rows()) / 3;
   load.force = runtime::vertex_force(rows, force);
   load.total = count * force;
+  if (full_ != nullptr) load.on_vertices = force_on_end(force);
   load.mean_basis.setZero(3, rows.cols());
   for (Eigen::Index v = 0; v < rows.rows() / 3; ++v) load.mean_basis += rows.middleRows<3>(3 * v) / count;
   const VertexArray& X = body_.reduced.object->mesh.vertices;
@@ -259,6 +295,7 @@ void Run::make_start() {
   }
   state_ = runtime::make_state(model_, q, v);
   runtime::prepare_contacts(model_, scene_.obstacles.size(), state_);
+  if (full_ != nullptr) runtime::prepare_full(*full_, state_);
   if (test_.body.free) {
     runtime::FrameMotion motion;
     motion.linear_velocity = Eigen::Vector3d(0, 0, -test_.velocity);
@@ -275,9 +312,8 @@ void Run::make_start() {
     result_.start_inverted += F.determinant() <= 0 ? 1.0 / static_cast<double>(cubature.weights.size()) : 0;
   }
   start_displacement_ = largest(q);
-  const runtime::Energies energies = runtime::energies(model_, scene_, state_);
-  record_.start_energy = energies.total();
-  record_.start_potential = energies.potential;
+  record_.start_energy = energies().total();
+  record_.start_potential = energies().potential;
   record_.kinetic = record_.peak_kinetic = kinetic();
 }
 
@@ -307,15 +343,62 @@ void Run::go_on_after_rest(bool was_at_rest) {
 
 // Kinetic energy of what comes to rest: the deformation, and all of a body that may touch the ground.
 double Run::kinetic() const {
-  if (test_.ground != Ground::kNone) return runtime::energies(model_, scene_, state_).kinetic;
-  return 0.5 * state_.v.squaredNorm();
+  if (test_.ground != Ground::kNone) return energies().kinetic;
+  if (!state_.full) return 0.5 * state_.v.squaredNorm();
+  // What the vertices do beside the turn and the shift of the body's frame.
+  const runtime::Placement frame = model_.frame->placement(state_.frame);
+  const runtime::FrameVelocity velocity = model_.frame->velocity(state_.frame);
+  const VertexArray& X = body_.reduced.object->mesh.vertices;
+  Eigen::VectorXd own = state_.full->v;
+  for (Eigen::Index v = 0; v < X.rows(); ++v) {
+    const std::int32_t number = full_->space.number(v);
+    if (number < 0) continue;
+    const Eigen::Vector3d there = X.row(v).transpose() + runtime::full_displacement(*full_, frame, *state_.full, v);
+    own.segment<3>(3 * number) -= velocity.linear + velocity.angular.cross(there - frame.position);
+  }
+  // Velocities are known to rounding: the kinetic energy to that and its product with the largest of them.
+  constexpr double kVelocityRounding = 1e-12;
+  return std::max(0.0, 0.5 * own.dot(full_->space.momentum(own)) - kVelocityRounding * energies().kinetic);
+}
+
+// What the loads of the scene do work on.
+Eigen::VectorXd Run::coordinates() const {
+  if (state_.full) return state_.full->q;
+  return full_ != nullptr ? full_->basis * state_.q : state_.q;
+}
+
+// Of a free body about its centre of mass, from its motion.
+Eigen::Vector3d Run::angular_momentum() const {
+  if (!state_.full) return precompute::angular_momentum(runtime::DeformingInertia(*body_.reduced.rigid), state_);
+  const runtime::Placement frame = model_.frame->placement(state_.frame);
+  const Eigen::VectorXd momenta = full_->space.momentum(state_.full->v);
+  const VertexArray& X = body_.reduced.object->mesh.vertices;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (Eigen::Index v = 0; v < X.rows(); ++v) {
+    const Eigen::Vector3d there = X.row(v).transpose() + runtime::full_displacement(*full_, frame, *state_.full, v);
+    sum += (there - frame.position).cross(momenta.segment<3>(3 * full_->space.number(v)));
+  }
+  return sum;
+}
+
+// The largest displacement of a vertex, of a free body beside that of its frame.
+double Run::displacement() const {
+  if (!state_.full) return largest(state_.q);
+  const runtime::Placement frame = model_.frame->placement(state_.frame);
+  const VertexArray& X = body_.reduced.object->mesh.vertices;
+  double most = 0;
+  for (Eigen::Index v = 0; v < X.rows(); ++v) {
+    const Eigen::Vector3d rest = X.row(v).transpose();
+    const Eigen::Vector3d there = rest + runtime::full_displacement(*full_, frame, *state_.full, v);
+    most = std::max(most, (there - frame.to_world(rest)).norm());
+  }
+  return most;
 }
 
 /// Displacement by the start and the loads in linear elasticity: a body of the energy W deflects to |q|_K = sqrt(2 W),
 /// a load that sets in at once to 2 |f|_(K^-1), and |u| <= reach |q|_K.
 double Run::linear_displacement() const {
-  const runtime::Energies energies = runtime::energies(model_, scene_, state_);
-  double energy = energies.elastic + energies.kinetic;
+  double energy = energies().elastic + energies().kinetic;
   double norm = 2 * body_.load_norm(scene_.gravity_force);
   if (test_.body.free && test_.ground == Ground::kNone)
     energy -= 0.5 * runtime::free_state(state_).linear_momentum.squaredNorm() / runtime::free_state(state_).mass;
@@ -354,13 +437,13 @@ void Run::watch(const runtime::StepReport& report, const Eigen::VectorXd& before
   if (test_.body.free && !scene_.forces.empty()) peak_rotation_ = std::max(peak_rotation_, rotation_energy());
   const double midpoint = state_.time - 0.5 * test_.time_step;
   for (const runtime::ScriptedForce& load : scene_.forces)
-    if (midpoint < load.end) work_ += load.force.dot(state_.q - before);
+    if (midpoint < load.end) work_ += (full_ != nullptr ? load.on_vertices : load.force).dot(coordinates() - before);
   const bool spins = test_.spin > 0;
   record_.add({.unsolved = ((report.status & runtime::kStepIterationLimit) != 0 ? 1 : 0) +
                            ((report.status & runtime::kStepStagnated) != 0 ? 1 : 0),
-               .displacement = largest(state_.q) / body_.size,
+               .displacement = displacement() / body_.size,
                .kinetic = kinetic(),
-               .energies = runtime::energies(model_, scene_, state_),
+               .energies = energies(),
                .work = work_,
                .momentum_error = spins ? (angular_momentum() - start_momentum_).norm() / start_momentum_.norm() : 0});
 }
@@ -375,14 +458,14 @@ double Run::rotation_energy() const {
 }
 
 void Run::step_all() {
-  Stepper stepper(model_, scene_, policy_);
+  Stepper stepper(model_, full_, scene_, policy_, state_);
   record_.displacement = start_displacement_ / body_.size;
-  record_.exchanged = runtime::energies(model_, scene_, state_).kinetic + state_.elastic_energy;
+  record_.exchanged = energies().kinetic + energies().elastic;
   Eigen::VectorXd before;
   const Timer timer;
   while (record_.steps < steps_) {
-    before = state_.q;
-    const runtime::StepReport report = stepper.step(state_);
+    before = coordinates();
+    const runtime::StepReport report = stepper.step();
     if ((report.status & runtime::kStepNonFinite) != 0) {
       record_.add({.non_finite = 1});
       break;
@@ -403,7 +486,7 @@ void Run::judge_all() {
       .displacement = displacement_bound(result_.linear_displacement + spun, start_displacement_ / body_.size),
       .rest = expects_rest_,
       .integrator = test_.integrator};
-  if (small(kSmall)) expected.displacement = kSmallMargin * result_.linear_displacement;
+  if (full_ == nullptr && small(kSmall)) expected.displacement = kSmallMargin * result_.linear_displacement;
   if (!scene_.examples.empty() && body_.reduced.examples)
     for (const ExampleData& example : body_.reduced.examples->examples)
       expected.displacement =

@@ -100,6 +100,29 @@ const std::vector<KnownLimit>& known_limits() {
        "couple after the solution: the next step takes it back, and bodies that do not move keep an angular velocity "
        "that grows with friction, depth and time step",
        "none; a larger contact stiffness or a smaller time_step"},
+      {"full-iterations", Check::kSolved,
+       [](const StabilityCase& test, const StudyBody&) { return test.space != Space::kReduced; }, 1,
+       "in all vertices, bodies that are thrown inside out, pressed flat or fall onto stiff ground",
+       "at most 20 iterations bound the time of a step: where that is not enough it ends with a larger residual",
+       kUnconverged},
+      {"full-settles", Check::kRest,
+       [](const StabilityCase& test, const StudyBody&) {
+         return test.space != Space::kReduced && test.body.free && test.time_step > kSixtieth;
+       },
+       1e-3, "in all vertices, free bodies in steps of 1/30 s that lie on the ground, or are inside out",
+       "a mesh has softer ways to move than the modes whose rate the run's length is of: what is left fades more "
+       "slowly",
+       "none: the summary's kinetic energy falls slowly"},
+      {"auto-returns", Check::kEnergy,
+       [](const StabilityCase& test, const StudyBody&) {
+         return test.space == Space::kAuto && test.body.material == MaterialModel::kCorotational &&
+                test.tip_load.norm() > 0;
+       },
+       0.5, "corotational, space auto, loads that turn elements inside out",
+       "the modes do not hold the folds that all vertices have when the load ends: the energy of the nearest pose in "
+       "them "
+       "is another",
+       "none; space full"},
       {"corotational-kink", Check::kSolved,
        [](const StabilityCase& test, const StudyBody&) {
          return test.body.material == MaterialModel::kCorotational && test.tip_load.norm() > 0;

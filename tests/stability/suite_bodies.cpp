@@ -139,6 +139,7 @@ std::unique_ptr<StudyBody> build(const BodySpec& spec, const std::filesystem::pa
   runtime::ModelResult result = runtime::build_model(body->reduced, options);
   if (!result.model) throw InputError(std::move(result.complaint));
   body->model = std::move(result.model);
+  body->full = runtime::build_full_model(body->reduced, *body->model).model;
   measure(*body);
   return body;
 }

@@ -8,7 +8,7 @@
 
 #include "common/model/reduced_model.h"
 #include "precompute/study/stability/body_scale.h"
-#include "runtime/sim/step/model.h"
+#include "runtime/sim/space/full/full_model.h"
 
 namespace exmat::precompute {
 
@@ -44,10 +44,11 @@ struct BodySpec {
 struct StudyBody : BodyScale {
   ReducedModel reduced;
   std::unique_ptr<const runtime::Model> model;
-  double least_dihedral = 0;     ///< least of all tets [rad]
-  double lowest_frequency = 0;   ///< [rad/s]
-  double mass_reach = 0;         ///< largest |U_v q| over |q| [kg^-1/2]
-  double highest_frequency = 0;  ///< highest by rest_stiffness [rad/s]
+  std::unique_ptr<const runtime::FullModel> full;  ///< null where it has none
+  double least_dihedral = 0;                       ///< least of all tets [rad]
+  double lowest_frequency = 0;                     ///< [rad/s]
+  double mass_reach = 0;                           ///< largest |U_v q| over |q| [kg^-1/2]
+  double highest_frequency = 0;                    ///< highest by rest_stiffness [rad/s]
 
   const RowMatrix& basis() const { return reduced.modal->basis; }
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <fmt/format.h>
 #include <iterator>
+#include <set>
 
 namespace exmat::precompute {
 namespace {
@@ -370,6 +371,23 @@ void add_mixed(Cases& cases) {
   std::ranges::move(mixed, std::back_inserter(cases));
 }
 
+/// The same cases of some groups in all vertices of the mesh, and those that a body goes there for by itself.
+void add_full(Cases& cases) {
+  Cases full;
+  const std::set<std::string_view> groups{"stiffness", "loads", "starts", "contact", "slivers", "no damping"};
+  for (const StabilityCase& test : cases) {
+    if (!groups.contains(test.group) || test.integrator == Integrator::kNewmark) continue;
+    StabilityCase& added = full.emplace_back(test);
+    added.group += ", full";
+    added.space = Space::kFull;
+    if (test.tip_load.isZero(0) && test.ground == Ground::kNone) continue;
+    StabilityCase& entering = full.emplace_back(test);
+    entering.group += ", auto";
+    entering.space = Space::kAuto;
+  }
+  std::ranges::move(full, std::back_inserter(cases));
+}
+
 }  // namespace
 
 std::string describe(const StabilityCase& test) {
@@ -392,6 +410,7 @@ std::vector<StabilityCase> short_stability_suite() {
   add_slivers(cases);
   add_nothing(cases);
   add_mixed(cases);
+  add_full(cases);
   return cases;
 }
 

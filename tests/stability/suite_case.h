@@ -50,6 +50,7 @@ struct StabilityCase {
   BodySpec body{};
   Integrator integrator = Integrator::kBdf2;
   Precision precision = Precision::kDouble;  ///< mixed: it steps as instances do, in lanes
+  Space space = Space::kReduced;             ///< full: all vertices of its mesh; auto: these where something acts
   double time_step = 1e-3;                   ///< [s]
   double gravity = 0;                        ///< along -z [m/s^2]
   /// Force on the free end in the first kLoadSteps steps, in units of what would move it by L in linear elasticity.

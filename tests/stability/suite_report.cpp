@@ -16,6 +16,12 @@
 namespace exmat::precompute {
 namespace {
 
+const char* total_of(const StabilityCase& test) {
+  if (test.precision == Precision::kMixed) return "all, mixed";
+  if (test.space == Space::kReduced) return "all";
+  return test.space == Space::kFull ? "all, full" : "all, auto";
+}
+
 using Row = std::vector<std::string>;
 using Json = nlohmann::ordered_json;
 
@@ -75,7 +81,7 @@ Table summary(const std::vector<StabilityRun>& runs) {
     if (!sums.contains(run.test.group)) groups.push_back(run.test.group);
     const std::string integrator(name_of(run.test.integrator));
     sums[run.test.group][integrator].add(run);
-    totals[run.test.precision == Precision::kMixed ? "all, mixed" : "all"][integrator].add(run);
+    totals[total_of(run.test)][integrator].add(run);
   }
   for (const std::string& group : groups)
     for (const auto& [integrator, sum] : sums[group]) table.add(row_of(group, integrator, sum));

@@ -159,10 +159,10 @@ BodyStep::BodyStep(const Model& model, const StepScene& scene, State& state, Wor
       potential_(model, scene, state, workspace),
       held_(holds_modes(state.attachments)) {}
 
-void BodyStep::begin(bool touches_others) noexcept {
+void BodyStep::begin(bool touches_others, double pushed) noexcept {
   const BodyFrame& frame = *model_.frame;
   frame.begin(in_frame_, workspace_.frame, workspace_.external_force);
-  near_ = is_near_obstacles(model_, scene_, state_, workspace_) || touches_others;
+  near_ = is_near_obstacles(model_, scene_, pushed, state_, workspace_) || touches_others;
   const Integrator integrator = integrator_of_step(model_, scene_, state_, near_, held_);
   frame.move(in_frame_, near_ || held_, integrator == Integrator::kBackwardEuler, state_.frame, workspace_.frame,
              workspace_.external_force);

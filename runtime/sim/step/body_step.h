@@ -31,8 +31,9 @@ class BodyStep {
  public:
   BodyStep(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept;
 
-  /// External forces, obstacles near, and the form of the integrator.
-  void begin(bool touches_others) noexcept;
+  /// External forces, obstacles near, and the form of the integrator. `pushed`: how far the bodies that it touches may
+  /// push a vertex in the step [m].
+  void begin(bool touches_others, double pushed = 0) noexcept;
 
   /// The first iterate, targets and example forces. False where numbers are not finite.
   bool prepare() noexcept;

@@ -24,7 +24,8 @@ void finish_contact(const Model& model, const State& state, bool converged, cons
   near.contact.force -= held.force;
 }
 
-bool is_near_obstacles(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept {
+bool is_near_obstacles(const Model& model, const StepScene& scene, double pushed, State& state,
+                       Workspace& workspace) noexcept {
   if (workspace.near) workspace.near->contact.candidate_count = 0;
   if (!touches(model, scene)) return false;
   const StageTimer timer(workspace.profile, Stage::kContact);
@@ -33,7 +34,7 @@ bool is_near_obstacles(const Model& model, const StepScene& scene, State& state,
   const BodyVelocity expected{model.frame->expected_velocity(state.frame, workspace.frame), state.v};
   const ContactSet& set = *model.contact;
   const double dt = scene.time_step;
-  const double travel = std::max(set.travel_bound(pose, velocity, dt), set.travel_bound(pose, expected, dt));
+  const double travel = std::max({set.travel_bound(pose, velocity, dt), set.travel_bound(pose, expected, dt), pushed});
   const double margin =
       kContactMarginSteps * travel + dt * dt * scene.gravity.norm() + state.contacts.longest_way_out();
   ContactWorkspace& contact = workspace.near->contact;

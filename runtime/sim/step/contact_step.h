@@ -9,9 +9,10 @@ namespace exmat::runtime {
 /// Pose of the body.
 BodyPose pose_of(const Model& model, const State& state) noexcept;
 
-/// True if any vertex may touch an obstacle in this step; then the candidates are in workspace.near. Changes
-/// nothing in the state but what saves searches.
-bool is_near_obstacles(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept;
+/// True if any vertex may touch an obstacle in this step, in which others push it `pushed` [m] far at most; then the
+/// candidates are in workspace.near. Changes nothing in the state but what saves searches.
+bool is_near_obstacles(const Model& model, const StepScene& scene, double pushed, State& state,
+                       Workspace& workspace) noexcept;
 
 /// The unknowns of a step near something, into workspace.near->x: of free flight, and of workspace.q.
 void start_contact(const Model& model, const StepScene& scene, const State& state, Workspace& workspace) noexcept;

@@ -23,9 +23,9 @@ void FullMember::place_surface() {
   surface_.place(frame, position, velocity);
 }
 
-bool FullMember::begin(const StepScene& scene) noexcept {
+bool FullMember::begin(const StepScene& scene, double pushed) noexcept {
   step_.emplace(full_, model_, scene, state_, workspace_, own_);
-  return step_->begin(/*touches_others=*/true);
+  return step_->begin(/*touches_others=*/true, pushed);
 }
 
 void FullMember::stay(Eigen::Ref<Eigen::VectorXd> d) noexcept {

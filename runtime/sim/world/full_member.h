@@ -25,7 +25,7 @@ class FullMember {
 
   // One step, in this order; evaluations as often as needed.
 
-  bool begin(const StepScene& scene) noexcept;
+  bool begin(const StepScene& scene, double pushed) noexcept;
   Eigen::Index unknowns() const noexcept { return full_.space.field_size(); }
   /// After a begin() of numbers that are not finite: no step will be taken.
   void fail() noexcept { own_.d.setConstant(std::numeric_limits<double>::quiet_NaN()); }

@@ -710,15 +710,17 @@ void settle(std::span<WorldBody* const> bodies, IslandWorkspace& workspace) noex
 NewtonReport begin_island_step(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
                                std::span<const std::vector<Incidence>> incidences, int threads,
                                IslandWorkspace& workspace) {
+  double pushed = 0;
+  for (const WorldBody* const body : bodies) pushed = std::max(pushed, body->travel);
   for_all(bodies.size(), threads, [&](std::size_t i) {
     WorldBody& own = *bodies[i];
     own.start_velocity = own.model.frame->velocity(own.state.frame).linear;
     if (own.full) {
-      if (!own.full->begin(own.scene())) own.full->fail();
+      if (!own.full->begin(own.scene(), pushed)) own.full->fail();
       return;
     }
     own.step.emplace(own.model, own.scene(), own.state, own.workspace);
-    own.step->begin(/*touches_others=*/true);
+    own.step->begin(/*touches_others=*/true, pushed);
     if (own.step->prepare()) {
       start_contact(own.model, own.scene(), own.state, own.workspace);
     } else {

@@ -96,7 +96,9 @@ void begin_of(std::span<WorldBody* const> bodies, IslandBegin& begin) {
     const BodyFrame& frame = *own->model.frame;
     const std::optional<FrameMomenta> momenta =
         own->full ? own->full->expected_momenta() : frame.expected_momenta(own->workspace.frame);
-    if (!momenta || own->near().contact.candidate_count > 0 || holds_modes(own->state.attachments)) return;
+    const ContactWorkspace& obstacles = own->near().contact;
+    const bool touches = own->state.contacts.count > 0 || (obstacles.candidate_count > 0 && obstacles.loaded_count > 0);
+    if (!momenta || touches || holds_modes(own->state.attachments)) return;
     // The centre of mass goes along its momentum: where the step begins and where it ends give the same.
     sum.linear += momenta->linear;
     sum.angular += momenta->angular + (position_of(*own) - begin.momenta.about).cross(momenta->linear);

@@ -29,8 +29,8 @@ struct IslandBegin {
   bool is_alone = false;  ///< there is nothing else; else the rest is of no meaning
 };
 
-/// After start_contact() of each, before the end of the step. They are not alone where something else takes part: an
-/// obstacle that is near, or a body that momenta do not move.
+/// After the solution, before the end of the step. They are not alone where something else takes part: an obstacle that
+/// pushes where it begins or ends, or a body that momenta do not move.
 void begin_of(std::span<WorldBody* const> bodies, IslandBegin& begin);
 
 /// After a step of theirs that did not converge, whose motion does not add up to what they have to have: gives them

@@ -440,17 +440,17 @@ void World::bound(int body) {
     own.full->place_surface();
     const MovingSurface& surface = own.full->surface();
     const double straight = dt * linear_velocity(own).norm();
-    margins_[index] =
-        kContactMarginSteps * std::max(0.0, dt * surface.speed() - straight) + dt * dt * own.scene().gravity.norm();
+    own.travel = dt * surface.speed();
+    margins_[index] = kContactMarginSteps * std::max(0.0, own.travel - straight) + dt * dt * own.scene().gravity.norm();
     balls_[index] = surface.bound();
     balls_[index].radius += margins_[index] + kContactMarginSteps * straight;
     return;
   }
   const BodyPose pose = pose_of(own.model, own.state);
   const BodyVelocity velocity{own.model.frame->velocity(own.state.frame), own.state.v};
-  const double travel = own.contact().travel_bound(pose, velocity, dt);
+  own.travel = own.contact().travel_bound(pose, velocity, dt);
   const double straight = dt * velocity.linear.norm();
-  margins_[index] = kContactMarginSteps * (travel - straight) + dt * dt * own.scene().gravity.norm();
+  margins_[index] = kContactMarginSteps * (own.travel - straight) + dt * dt * own.scene().gravity.norm();
   const DeformationTree::Ball ball = own.surface.bound(own.state.q);
   balls_[index] = {pose.position + pose.rotation * ball.centre,
                    ball.radius + margins_[index] + kContactMarginSteps * straight};

@@ -202,7 +202,7 @@ FullBodyStep::FullBodyStep(const FullModel& full, const Model& model, const Step
       own_(own),
       step_(full, scene, *state.full, own, full_memory(full, scene, state, workspace)) {}
 
-bool FullBodyStep::begin(bool touches_others) noexcept {
+bool FullBodyStep::begin(bool touches_others, double pushed) noexcept {
   FullMotion& motion = *state_.full;
   motion.step = state_.step;
   motion.time = state_.time;
@@ -213,7 +213,7 @@ bool FullBodyStep::begin(bool touches_others) noexcept {
     workspace_.near->contact.candidate_count = 0;
     workspace_.near->contact.set_zero(workspace_.near->contact.generalised.size());
   }
-  step_.begin(touches_others);
+  step_.begin(touches_others, pushed);
   find_targets(full_, model_, scene_, state_, workspace_, step_, own_, report_);
   return (report_.status & kStepNonFinite) == 0;
 }

@@ -46,7 +46,7 @@ class FullBodyStep {
                FullWorkspace& own) noexcept;
 
   /// FullStep::begin(), weights and target. False where numbers are not finite.
-  bool begin(bool touches_others = false) noexcept;
+  bool begin(bool touches_others = false, double pushed = 0) noexcept;
 
   FullStep& step() noexcept { return step_; }
 

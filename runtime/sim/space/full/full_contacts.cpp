@@ -22,7 +22,7 @@ FullContacts::FullContacts(const ContactData& data, const FullSpace& space)
 }
 
 bool FullContacts::begin(const Obstacles& obstacles, double end_time, double time_step, const Eigen::Vector3d& gravity,
-                         const double* u, const double* v, const ContactState& held,
+                         double pushed, const double* u, const double* v, const ContactState& held,
                          ContactWorkspace& contact) const noexcept {
   contact.candidate_count = contact.loaded_count = 0;
   contact.are_all_planes = false;
@@ -39,7 +39,7 @@ bool FullContacts::begin(const Obstacles& obstacles, double end_time, double tim
     ++moving;
   }
   centre /= std::max(1, moving);
-  const double way = time_step * std::sqrt(square);
+  const double way = std::max(time_step * std::sqrt(square), pushed);
   const double margin = kContactMarginSteps * way + time_step * time_step * gravity.norm() + held.longest_way_out();
   for (std::size_t i = 0; i < obstacles.size(); ++i) {
     PlacedObstacle& placed = contact.obstacles[i] = PlacedObstacle(*obstacles[i], end_time, time_step);

@@ -47,9 +47,11 @@ class FullContacts {
 
   Eigen::Index vertices() const { return areas_.size(); }
 
-  /// Candidates of a step from the displacement u with the velocity v; false where there are none.
+  /// Candidates of a step from the displacement u with the velocity v, in which other bodies push a vertex `pushed` [m]
+  /// far at most; false where there are none.
   bool begin(const Obstacles& obstacles, double end_time, double time_step, const Eigen::Vector3d& gravity,
-             const double* u, const double* v, const ContactState& held, ContactWorkspace& contact) const noexcept;
+             double pushed, const double* u, const double* v, const ContactState& held,
+             ContactWorkspace& contact) const noexcept;
 
   /// Their forces at u, subtracted from `gradient`; sums without the generalised force are in `contact`, the torque
   /// about the world's origin. Returns the norm of the forces [N].

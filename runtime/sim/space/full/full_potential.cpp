@@ -229,7 +229,9 @@ PotentialEvaluation FullPotential::gradient_there(const Eigen::VectorXd& d, Eige
                            times * kPlaceRounding * reach_ * space_.stiffness() / scene_.space.newton.tolerance;
   PotentialValue& total = evaluation.potential;
   total.value = sums_[0] + sums_[1] + sums_[2] + sums_[3];
-  total.magnitude = total.value + work.external.cwiseAbs().dot(d.cwiseAbs()) + reach_ * force.lpNorm<1>();
+  // Elastic energies are differences of terms as large as at strains about 1.
+  total.magnitude = total.value + work.external.cwiseAbs().dot(d.cwiseAbs()) + reach_ * force.lpNorm<1>() +
+                    times * space_.shear_energy();
   total.value -= work_;
   gradient = force;
   if (filters()) set_filter_coefficients(total);

@@ -161,6 +161,7 @@ void FullSpace::add_matrices(const TetMesh& mesh, const TetMaterials& materials)
       laplacian_[k] += share;
       if (i == j) stiffness[static_cast<Eigen::Index>(row)] += share;
     });
+    shear_energy_ += volumes[t] * lame.mu;
     for (int i = 0; i < 4; ++i)
       if (const std::int32_t own = number(mesh.tets(t, i)); own >= 0)
         gravity_load_.middleRows<3>(3 * own).diagonal().array() += mass / 4;

@@ -72,6 +72,7 @@ class FullSpace {
   double wave_rate() const { return wave_rate_; }        ///< edges a second that the fastest waves pass [1/s]
   double extent() const { return extent_; }              ///< largest coordinate at rest [m]
   double stiffness() const { return stiffness_; }        ///< norm of those of the vertices, about [N/m]
+  double shear_energy() const { return shear_energy_; }  ///< integral of mu: elastic energies at strains about 1 [J]
   const Eigen::Matrix<double, Eigen::Dynamic, 3>& gravity_load() const { return gravity_load_; }  ///< f x 3 [kg]
   /// Place in fields of a vertex of the mesh, -1 where it has none, and its number among those that move, -1 where it
   /// is fixed.
@@ -142,7 +143,7 @@ class FullSpace {
 
   MaterialModel model_ = MaterialModel::kStVenantKirchhoff;
   bool clamped_ = false;
-  double edge_ = 0, extent_ = 0, wave_rate_ = 0, stiffness_ = 0;
+  double edge_ = 0, extent_ = 0, wave_rate_ = 0, stiffness_ = 0, shear_energy_ = 0;
   std::vector<std::int32_t> vertex_of_;  ///< vertex of each place in a field, among those that move
   std::vector<std::int32_t> place_of_;   ///< place of each vertex of the mesh, -1: none
   Eigen::Index driven_ = 0;

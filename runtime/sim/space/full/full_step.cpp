@@ -173,14 +173,14 @@ void FullStep::gather_external_force() noexcept {
 }
 
 // Takes u and v, fields in the workspace's `trial` and `field`.
-bool FullStep::find_contacts() noexcept {
+bool FullStep::find_contacts(double pushed) noexcept {
   if (!model_.contacts || memory_.found == nullptr) return false;
   const double end = static_cast<double>(state_.step + 1) * scene_.time_step;
-  return model_.contacts->begin(scene_.obstacles, end, scene_.time_step, scene_.gravity, workspace_.trial.data(),
-                                workspace_.field.data(), *memory_.held, *memory_.found);
+  return model_.contacts->begin(scene_.obstacles, end, scene_.time_step, scene_.gravity, pushed,
+                                workspace_.trial.data(), workspace_.field.data(), *memory_.held, *memory_.found);
 }
 
-void FullStep::begin(bool touches_others) noexcept {
+void FullStep::begin(bool touches_others, double pushed) noexcept {
   among_others_ = touches_others;
   anew_ = jumps(scene_, state_) || (memory_.bones != nullptr && memory_.bones->anew);
   gather_external_force();
@@ -189,7 +189,7 @@ void FullStep::begin(bool touches_others) noexcept {
     space_.to_field(state_.q, workspace_.trial);
     space_.to_field(state_.v, workspace_.field);
   }
-  near_ = find_contacts();
+  near_ = find_contacts(pushed);
   potential_.set_contact(near_ ? memory_.found : nullptr);
   if (model_.rigid) {
     model_.rigid->place(workspace_.trial.data(), workspace_.potential.rigid);
@@ -585,7 +585,8 @@ NewtonStatus FullStep::minimise() noexcept {
         continue;
     } else if (tangents_are_current_) {
       potential_.evaluate_elements(work.d, FullPotential::Tangents::kNone, false);
-      return NewtonStatus::kStagnated;
+      const bool is_at_rest = report_.residual <= scene_.space.newton.tolerance * here_.force_scale;
+      return is_at_rest ? NewtonStatus::kConverged : NewtonStatus::kStagnated;
     }
     projected_ = false;
     tangents_are_current_ = true;

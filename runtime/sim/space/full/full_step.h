@@ -118,8 +118,9 @@ class FullStep {
 
   /// Obstacles near, and the first iterate: the predictor q_n + dt v_n or q_n, whichever has the lower potential; where
   /// ends of directions are taken unchecked, the predictor unless it moves a vertex by half an edge or the step has no
-  /// smooth past. `touches_others`: other bodies are near; the step is solved with theirs.
-  void begin(bool touches_others = false) noexcept;
+  /// smooth past. `touches_others`: other bodies are near; the step is solved with theirs, and they may
+  /// push a vertex `pushed` [m] far.
+  void begin(bool touches_others = false, double pushed = 0) noexcept;
 
   /// Displacement [f] at the first iterate, of which weights and target are made.
   void first_iterate(Eigen::VectorXd& u) const noexcept;
@@ -168,13 +169,13 @@ class FullStep {
 
  private:
   enum class Outcome { kFound, kIndefinite };
-  static constexpr double kStiffStep = 10;  ///< edges that waves go
+  static constexpr double kStiffStep = 4;  ///< edges that waves go
 
   void see_coefficients() noexcept;
   void own_velocity(double time, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                     Eigen::VectorXd& own) const noexcept;
   void carry(Eigen::VectorXd& d) const noexcept;
-  bool find_contacts() noexcept;
+  bool find_contacts(double pushed) noexcept;
   void precondition_freely() noexcept;
   void filter_coefficients() noexcept;
   void hold(Eigen::VectorXd& d) const noexcept;

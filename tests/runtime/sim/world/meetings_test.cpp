@@ -56,6 +56,14 @@ TEST(Meetings, NoneOfThoseThatGainedDoes) {
     }
 }
 
+// It ended with 1.09 times its energy: an obstacle near by, which pushes nothing, is no reason to leave it that.
+TEST(Meetings, NoneGainsEnergyBesideAnObstacle) {
+  const Meeting meeting{1e3, 50, 1e9, 1.0 / 60, true, 1, 2};
+  test::MeetingBlocks blocks = test::meeting_blocks(meeting);
+  blocks.scene.obstacles.push_back(Obstacle{Plane{{0, 0, -2}, Eigen::Vector3d::UnitZ()}, RigidMotion(), 1e6, 0, 0});
+  EXPECT_LE(test::meet(blocks, meeting).peak, 1 + kGain);
+}
+
 TEST(Meetings, GoOnFromTheirMemoryToTheLastBit) {
   for (const int full : {0, 1, 2}) {
     const Meeting meeting{1e4, 5, 1e9, 1.0 / 60, true, 1, 2, full};
