@@ -16,6 +16,7 @@ constexpr double kLargestDisplacement = 0.4;  // of L
 constexpr double kSmallestShare = 0.05;       // of that
 constexpr double kNoiseEnergy = 0.01;
 constexpr double kLeastMotion = 0.01;                          // of the largest
+constexpr double kAtRest = 1e-12;                              // of the largest: own motions below that are none
 constexpr Eigen::Index kExampleStride = 4;                     // every fourth pose is an example's
 constexpr Eigen::Index kMotionCycle = 8, kMotionsOfCycle = 6;  // poses of motions, where there are any
 
@@ -138,13 +139,19 @@ void set_motions(const Eigen::MatrixXd& motions, Eigen::Index own, const Eigen::
 
 namespace {
 
+double largest_norm(const Eigen::MatrixXd& motions) {
+  return motions.cols() > 0 ? motions.colwise().norm().maxCoeff() : 0;
+}
+
 RowMatrix draw(const PoseSource& source, const Eigen::MatrixXd& motions, Eigen::Index own, Eigen::Index count,
                std::uint64_t seed) {
   PoseGenerator generator(source, seed);
   std::vector<PoseGenerator::Rest> drawn;
   const bool has_examples = source.examples.cols() > 0;
+  const double largest = largest_norm(motions);
+  if (!(largest_norm(motions.leftCols(own)) > kAtRest * largest)) own = 0;
   for (Eigen::Index i = 0; i < count; ++i) {
-    if (motions.cols() > 0 && i % kMotionCycle < kMotionsOfCycle)
+    if (largest > 0 && i % kMotionCycle < kMotionsOfCycle)
       drawn.push_back(generator.of_motion(motions, own));
     else
       drawn.push_back(has_examples && i % kExampleStride == kExampleStride - 1 ? generator.on_segment()

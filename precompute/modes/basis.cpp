@@ -73,12 +73,12 @@ void require_modes(Eigen::Index found, int size) {
 }
 
 // Fills the basis up to so many with the principal components of the columns, in its complement and the `norm` product.
-void fill_up(const SparseMatrix& mass, const SparseMatrix& norm, Eigen::MatrixXd columns, int size,
+void fill_up(const ElasticSystem& system, const SparseMatrix& norm, Eigen::MatrixXd columns, int size,
              Eigen::MatrixXd& basis) {
-  remove_components(mass, basis, columns);
-  const Eigen::Index before = basis.cols();
+  remove_components(system.mass, basis, columns);
+  const Eigen::Index before = basis.cols(), deforming = system.mass.rows() - system.null_space.cols();
   const Eigen::MatrixXd components = principal_components(norm, columns, size - before);
-  require_modes(before + components.cols(), size);
+  require_modes(std::min(before + components.cols(), deforming), size);
   basis.conservativeResize(Eigen::NoChange, size);
   basis.rightCols(size - before) = components;
 }
@@ -124,7 +124,7 @@ Eigen::MatrixXd modal_basis(const BasisInput& input, int size) {
   Eigen::MatrixXd basis(mass.rows(), 0);
   if (input.example_fields.cols() > 0)
     basis = principal_components(mass, unit_fields(input.system, input.example_fields), most_fields(size));
-  fill_up(mass, mass, scaled_snapshots(input), size, basis);
+  fill_up(input.system, mass, scaled_snapshots(input), size, basis);
   finish(input, basis);
   return basis;
 }
@@ -146,7 +146,7 @@ Eigen::MatrixXd trained_basis(const BasisInput& input, const Eigen::MatrixXd& sn
   Eigen::MatrixXd basis(columns.rows(), 0);
   if (input.example_fields.cols() > most_fields(kBasisSize))  // more than runs of a few loads show
     basis = principal_components(system.mass, unit_fields(system, input.example_fields), most_fields(size));
-  fill_up(system.mass, norm, std::move(columns), size, basis);
+  fill_up(system, norm, std::move(columns), size, basis);
   orthonormalise(system.mass, basis);
   finish(input, basis);
   return basis;

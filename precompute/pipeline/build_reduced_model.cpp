@@ -354,6 +354,10 @@ std::optional<Motions> Pipeline::train(const BodyStages& stages, const PlannedTr
       warn(report_.warnings,
            "training: the loads move no vertex, so the basis is that of linear modes; do they act on vertices that are "
            "free to move?");
+    else if (const Eigen::Index own = motions.own_columns();
+             own > 0 && !(runs.snapshots.leftCols(own).cwiseAbs().maxCoeff() > least))
+      warn(report_.warnings,
+           "training: the scene itself moves no vertex; do its forces act within its steps, and do they not cancel?");
     if (!(moved > least)) result.reset();
     return result;
   });
@@ -389,12 +393,16 @@ void Pipeline::add_fidelity(const BodyStages& stages, const Motions& motions, co
                         100 * found.shape_error, motions.elements ? "a body of many modes" : "the full space",
                         found.heldout_runs, 100 * found.modal_error, found.advice));
   constexpr double kWorse = 1.1, kSmall = 0.02;  // times the error of modes; an error that is none
+  constexpr double kFar = 0.1;                   // an error that shows
   if (found.shape_error > std::max(kWorse * found.modal_error, kSmall))
     warn(report_.warnings,
          fmt::format(
              "training made the body worse: it is {:.2g} % from the full space in held-out runs, modes alone with "
              "all elements {:.2g} %; {}, or basis.training \"none\"",
              100 * found.shape_error, 100 * found.modal_error, found.advice));
+  else if (found.shape_error > kFar)
+    warn(report_.warnings, fmt::format("in held-out runs the body is {:.2g} % from the full space: {}",
+                                       100 * found.shape_error, found.advice));
 }
 
 void Pipeline::settle_examples(const BodyStages& stages, ReducedModel& model) {

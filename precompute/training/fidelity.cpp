@@ -67,15 +67,10 @@ std::string advice(const FidelityInput& input, const FidelityData& fidelity, con
   if (const double lost = largest_loss(input.model); lost > kLost)
     return fmt::format(
         "near the full space under the loads that were tried; more shape_space.eigenfunctions would bring it nearer to "
-        "the poses, of "
-        "which they lose {:.0f} %",
+        "the poses, of which they lose {:.0f} %",
         100 * lost);
-  const bool free = !input.model.object->fixed.any();
-  return fmt::format(
-      "near the full space under what was tried: {}; not tried: {}: train on them (basis.loads, or a scene) if it is "
-      "to "
-      "serve them",
-      tried_text(input.tried, free), untried_text(input.tried, free));
+  return "near the full space under what was tried; train on more (basis.loads, or a scene) if it is to serve other "
+         "loads";
 }
 
 }  // namespace
@@ -99,7 +94,9 @@ FidelityData fidelity_of(const FidelityInput& input) {
   fidelity.target_error = largest_target_error(model);
   fidelity.worst_vertex = input.final_run.worst_vertex;
   fidelity.worst_distance = finite(input.final_run.worst_distance / bounding_box_diagonal(model.object->mesh.vertices));
-  fidelity.advice = advice(input, fidelity, mass);
+  const bool free = !model.object->fixed.any();
+  fidelity.advice = fmt::format("{}; tried: {}; not tried: {}", advice(input, fidelity, mass),
+                                tried_text(input.tried, free), untried_text(input.tried, free));
   return fidelity;
 }
 

@@ -135,6 +135,7 @@ std::string tried_text(const TrainingLoads& loads, bool free) {
   if (!loads.forces.empty()) tried.push_back(fmt::format("{} forces on vertices", loads.forces.size()));
   if (loads.patches) tried.emplace_back("pushes on patches of the surface");
   if (loads.obstacle && free) tried.push_back(fmt::format("throws at a plane with {:.3g} m/s", loads.velocity.norm()));
+  if (tried.empty()) tried.emplace_back("how it moves by itself");
   return fmt::format("{}", fmt::join(tried, ", "));
 }
 

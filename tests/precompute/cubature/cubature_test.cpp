@@ -188,5 +188,16 @@ TEST_P(Cubature, PosesOfMotionsAreTheirs) {
   EXPECT_EQ(of_motions, 60);
 }
 
+// A scene whose forces never act has an own run in which nothing moves, and perhaps no other.
+TEST_P(Cubature, NoPoseIsThatOfARunAtRest) {
+  PoseSource source = source_;
+  source.motions = Eigen::MatrixXd::Random(source_.rest_stiffness.rows(), 20);
+  source.motions.leftCols(8).setZero();
+  source.own_motions = 8;
+  source.other_motions = Eigen::MatrixXd::Zero(source_.rest_stiffness.rows(), 4);
+  for (const RowMatrix& poses : {draw_poses(source, 40, 5), draw_heldout_poses(source, 40, 5)})
+    EXPECT_GT(poses.rowwise().norm().minCoeff(), 1e-3 * poses.rowwise().norm().maxCoeff());
+}
+
 }  // namespace
 }  // namespace exmat::precompute

@@ -114,6 +114,22 @@ TEST_P(Basis, IsMassOrthonormalAndFreeOfRigidMotion) {
   }
 }
 
+// Derivatives of modes hold rigid motions, too, which are no deformations.
+TEST_P(Basis, HasAtMostAsManyColumnsAsThereAreDeformations) {
+  mesh_ = test::box_mesh({1, 1, 1}, {1.0, 0.3, 0.25});
+  materials_ = {Eigen::VectorXd::Constant(mesh_.tet_count(), 1000), Eigen::VectorXd::Constant(mesh_.tet_count(), 1e5),
+                Eigen::VectorXd::Constant(mesh_.tet_count(), 0.35)};
+  FlagVector fixed = FlagVector::Zero(mesh_.vertex_count());
+  for (Eigen::Index v = 0; clamped() && v < fixed.size(); ++v) fixed[v] = mesh_.vertices(v, 0) < 1e-9 ? 1 : 0;
+  system_ = build_elastic_system(mesh_, materials_, fixed);
+  solver_.emplace(system_.stiffness, system_.mass * system_.null_space, "test");
+  modes_ = linear_modes(system_, *solver_, 9);
+  derivatives_ = modal_derivatives(mesh_, materials_, system_, *solver_, modes_.modes);
+  const int most = clamped() ? 12 : 18;
+  EXPECT_EQ(basis(most).cols(), most);
+  EXPECT_THROW(basis(most + 1), InputError);
+}
+
 TEST_P(Basis, DoesNotDependOnUnits) {
   const auto U = basis(15);
   mesh_.vertices *= 1000;  // millimetres
