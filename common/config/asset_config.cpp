@@ -306,6 +306,24 @@ class AssetReader {
 
 AssetConfig load_asset(const std::filesystem::path& file) { return asset_of(read_json(file), file); }
 
+void require_files(const AssetConfig& asset) {
+  const auto require = [&](const std::filesystem::path& file, const std::string& place, const char* expected) {
+    require_file(file, asset.file, place, expected);
+  };
+  require(asset.object_mesh, asset.object_surface ? "/object/surface" : "/object/mesh",
+          asset.object_surface ? "a surface" : "a mesh of tets");
+  if (asset.render_mesh) require(*asset.render_mesh, "/object/render_mesh", "a surface");
+  for (std::size_t i = 0; i < asset.examples.size(); ++i) {
+    const ExampleConfig& example = asset.examples[i];
+    if (!example.mesh.empty()) require(example.mesh, fmt::format("/examples/{}/mesh", i), "a mesh of tets");
+    if (example.surface) require(*example.surface, fmt::format("/examples/{}/surface", i), "a surface");
+  }
+  if (asset.alignment.landmarks)
+    require(*asset.alignment.landmarks, "/alignment/landmarks", "a text file of landmarks");
+  for (std::size_t i = 0; i < asset.alignment.maps.size(); ++i)
+    require(asset.alignment.maps[i].file, fmt::format("/alignment/map/{}/file", i), "a text file of vertex numbers");
+}
+
 AssetConfig asset_of(const Json& json, const std::filesystem::path& file) {
   check_against_schema(json, "asset", file);
   return AssetReader(file).read(json);

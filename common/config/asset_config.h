@@ -166,4 +166,7 @@ struct AssetConfig {
   double length_unit = 1;  ///< unit of the numbers of all meshes [m]
 };
 
+/// Throws InputError that names the asset's member where a mesh, a surface, landmarks or a map are not there.
+void require_files(const AssetConfig& asset);
+
 }  // namespace exmat

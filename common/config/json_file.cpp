@@ -118,7 +118,7 @@ class StructureCheck : public nlohmann::json_sax<Json> {
 
 nlohmann::json read_json(const std::filesystem::path& file) {
   const std::string text = read_text_file(file, "a JSON file");
-  if (const std::string_view kind = kind_of_file(text); !kind.empty())
+  if (const std::string_view kind = kind_of_file(file, text); !kind.empty() && kind != kJson)
     throw InputError(
         {file.string(), "", "a JSON file", std::string(kind),
          "a scene names its bundle in a JSON file, an asset its mesh; exmat-precompute bundle takes a surface "

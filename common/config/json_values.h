@@ -33,6 +33,10 @@ std::optional<T> optional_member(const Json& object, const char* name) {
 /// A path of a JSON file, relative to that file.
 std::filesystem::path resolve_path(const std::filesystem::path& json_file, const std::string& path);
 
+/// Throws InputError where `file` is not there, which names the place of the JSON file that names it.
+void require_file(const std::filesystem::path& file, const std::filesystem::path& json_file, const std::string& place,
+                  const std::string& expected, const std::string& advice = "");
+
 /// 0-based vertex ids; throws InputError where one is repeated.
 std::vector<std::int64_t> read_ids(const Json& ids, const std::filesystem::path& json_file, const std::string& place);
 

@@ -83,12 +83,14 @@ std::vector<RegionForceConfig> read_region_forces(const Json& json, const std::f
 VertexForceConfig read_vertex_force(const Json& json, const std::filesystem::path& file, const std::string& place) {
   VertexForceConfig config;
   VertexSelection places = read_selection(json["vertices"], file, place + "/vertices");
-  if (const auto* from = std::get_if<FileSelection>(&places))
+  if (const auto* from = std::get_if<FileSelection>(&places)) {
+    require_file(from->file, file, place + "/vertices/file", "a text file of vertex ids");
     config.vertices = read_vertex_ids(from->file);
-  else if (auto* ids = std::get_if<IdSelection>(&places))
+  } else if (auto* ids = std::get_if<IdSelection>(&places)) {
     config.vertices = std::move(ids->ids);
-  else
+  } else {
     config.places = std::move(places);
+  }
   config.force = read_vector(json["force"]);
   config.start = json.value("start", config.start);
   config.end = json.value("end", config.end);
@@ -258,7 +260,11 @@ std::vector<BodyPlace> read_places(const Json& own, const std::filesystem::path&
   if (own.contains("grid") && own.contains("poses"))
     throw InputError({file.string(), place, "grid or poses", "both", ""});
   if (own.contains("grid")) return read_grid(own["grid"]);
-  if (own.contains("poses")) return read_poses(resolve_path(file, own["poses"]));
+  if (own.contains("poses")) {
+    const std::filesystem::path poses = resolve_path(file, own["poses"]);
+    require_file(poses, file, place + "/poses", "a text file of poses");
+    return read_poses(poses);
+  }
   return {BodyPlace{}};
 }
 
@@ -322,10 +328,22 @@ WorldConfig world_of(const Json& json, const std::filesystem::path& file) {
   return world;
 }
 
-void require_bundle(const SceneConfig& scene) {
-  if (scene.pack || std::filesystem::exists(scene.bundle)) return;
-  throw InputError({scene.file.string(), scene.place + "/bundle", "a bundle", "no such file: " + scene.bundle.string(),
-                    "make it with exmat-precompute bundle ASSET.json -o " + scene.bundle.filename().string()});
+void require_files(const SceneConfig& scene) {
+  if (!scene.pack)
+    require_file(scene.bundle, scene.file, scene.place + "/bundle", "a bundle",
+                 "make it with exmat-precompute bundle ASSET.json -o " + scene.bundle.filename().string());
+  require_obstacle_files(scene);
+}
+
+void require_obstacle_files(const SceneConfig& scene) {
+  for (std::size_t i = 0; i < scene.obstacles.size(); ++i) {
+    const auto& shape = scene.obstacles[i].shape;
+    if (const auto* mesh = std::get_if<MeshConfig>(&shape))
+      require_file(mesh->file, scene.file, fmt::format("/obstacles/{}/mesh/file", i), "a surface");
+    if (const auto* heights = std::get_if<HeightFieldConfig>(&shape); heights && heights->file)
+      require_file(*heights->file, scene.file, fmt::format("/obstacles/{}/height_field/file", i),
+                   "a text file of heights");
+  }
 }
 
 std::vector<VertexForceConfig> forces_on_vertices(const SceneConfig& config, SelectablePoints points) {

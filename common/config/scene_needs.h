@@ -14,8 +14,11 @@ WorldConfig world_of(SceneConfig scene);
 /// The file that a run writes in place of the scene's, or none.
 void set_trajectory(const std::optional<std::filesystem::path>& file, WorldConfig& world);
 
-/// Throws InputError that names the scene's member where the bundle is not there.
-void require_bundle(const SceneConfig& scene);
+/// Throws InputError that names the scene's member where the bundle is not there, or a file of an obstacle.
+void require_files(const SceneConfig& scene);
+
+/// The same of the obstacles alone.
+void require_obstacle_files(const SceneConfig& scene);
 
 /// Throws InputError where an example force, a `member` of the scene, is given weights, but not one for each of its
 /// `examples`.

@@ -98,12 +98,17 @@ void catch_signals() {
   std::signal(SIGXFSZ, SIG_IGN);  // a write then fails, with a reason
 }
 
+/// Commands and groups of options, which the parser keeps likewise.
+std::vector<const CLI::App*> parts_of(const CLI::App& app) {
+  return app.get_subcommands([](const CLI::App*) { return true; });
+}
+
 void refuse_empty_values(const CLI::App& app) {
   for (const CLI::Option* option : app.get_options())
     for (const std::string& value : option->results())
       if (value.empty())
         throw InputError({option->get_name(), "", "a value", "an empty one", "give one, or leave the option out"});
-  for (const CLI::App* command : app.get_subcommands()) refuse_empty_values(*command);
+  for (const CLI::App* part : parts_of(app)) refuse_empty_values(*part);
 }
 
 void flush_output() {
@@ -111,10 +116,38 @@ void flush_output() {
   if (!written) throw WorkError(fmt::format("cannot write to standard output: {}", std::strerror(errno)));
 }
 
-/// The parser's message, with all names of an option that is missing, and with the command that a word may have meant.
+/// Adds the options of a program or a command, and of its groups, as words of the command line.
+void add_options(const CLI::App& app, std::vector<std::string>& names) {
+  for (const CLI::Option* option : app.get_options())
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  for (const CLI::App* part : parts_of(app))
+    if (part->get_name().empty()) add_options(*part, names);
+}
+
+/// The first word that is meant as an option, and is none, with the one that it may have meant; empty: there is none.
+std::string unknown_option(const CLI::App& app) {
+  std::vector<std::string> names;
+  add_options(app, names);
+  for (const CLI::App* command : app.get_subcommands()) add_options(*command, names);
+  for (const std::string& word : app.remaining(true)) {
+    if (!word.starts_with("-") || word == "--") continue;
+    const std::string option = word.substr(0, word.find('='));
+    const std::string nearest = nearest_name(option, names);
+    return fmt::format("there is no option '{}'{}", option,
+                       nearest.empty() ? "" : fmt::format("; did you mean {}?", nearest));
+  }
+  return {};
+}
+
+/// The parser's message, with all names of an option that is missing, and with the command or the option that a word
+/// may have meant.
 std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
   std::string message = error.what();
-  const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
+  const auto commands = parts_of(app);
+  const bool is_of_words = dynamic_cast<const CLI::RequiredError*>(&error) != nullptr ||
+                           dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
+  if (is_of_words && (commands.empty() || !app.get_subcommands().empty()))
+    if (const std::string unknown = unknown_option(app); !unknown.empty()) return unknown;
   for (const CLI::App* command : commands)
     for (const CLI::Option* option : command->get_options())
       if (message == option->get_name() + " is required") message = option->get_name(false, true) + " is required";

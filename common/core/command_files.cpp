@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <sys/stat.h>
 #include <utility>
@@ -88,26 +89,41 @@ OwnOutputRead::~OwnOutputRead() {
 
 namespace {
 
-void claim(const std::filesystem::path& file, const std::string& role) {
-  const std::lock_guard lock(registry().mutex);
-  if (registry().commands == 0) return;
+/// Nothing where there is no command.
+std::optional<Known> allowed_output(const std::filesystem::path& file, const std::string& role) {
+  if (registry().commands == 0) return std::nullopt;
   const Identity identity = identity_of(file);
   if (const Known* input = find(registry().inputs, identity)) refuse_output(file, role, input->file);
   if (const Known* output = find(registry().outputs, identity))
     throw InputError({file.string(), role, "a file of its own",
                       "that of " + output->role + (output->file == file ? "" : ", " + output->file.string()),
                       "choose another name"});
-  registry().outputs.push_back({identity, file, role});
+  return Known{identity, file, role};
 }
 
-}  // namespace
+void claim(const std::filesystem::path& file, const std::string& role) {
+  const std::lock_guard lock(registry().mutex);
+  if (const auto known = allowed_output(file, role)) registry().outputs.push_back(*known);
+}
 
-void claim_output(const std::filesystem::path& file, const std::string& role) {
+void require_regular(const std::filesystem::path& file, const std::string& role) {
   std::error_code ignored;
   const auto status = std::filesystem::status(file, ignored);
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
     throw InputError({file.string(), role, "a file, or the name of a new one",
                       std::filesystem::is_directory(status) ? "a folder" : kNoRegularFile, "choose another name"});
+}
+
+}  // namespace
+
+void check_output(const std::filesystem::path& file, const std::string& role) {
+  require_regular(file, role);
+  const std::lock_guard lock(registry().mutex);
+  allowed_output(file, role);
+}
+
+void claim_output(const std::filesystem::path& file, const std::string& role) {
+  require_regular(file, role);
   claim(file, role);
 }
 
@@ -134,13 +150,24 @@ void check_input(const std::filesystem::path& file, const std::string& expected)
 
 std::filesystem::path link_target(std::filesystem::path target) {
   constexpr int kMostLinks = 40;  // as Linux follows
+  const std::string name = target.string();
   std::error_code error;
-  for (int links = 0; links < kMostLinks; ++links) {
+  for (int links = 0; links <= kMostLinks; ++links) {
     const auto next = std::filesystem::read_symlink(target, error);
     if (error) return target;
     target = target.parent_path() / next;
   }
-  return target;
+  throw InputError({name, "", "a name, or links that lead to one", "links that lead to each other",
+                    "remove them, or choose another name"});
+}
+
+std::filesystem::path current_folder() {
+  std::error_code error;
+  std::filesystem::path folder = std::filesystem::current_path(error);
+  if (error)
+    throw InputError({"current folder", "", "a folder that exists", error.message(),
+                      "it was removed or moved: change to another folder, and name files from there"});
+  return folder;
 }
 
 }  // namespace exmat

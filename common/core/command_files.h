@@ -21,6 +21,9 @@ class CommandFiles {
 /// work.
 void claim_output(const std::filesystem::path& file, const std::string& role);
 
+/// The same of a file that is about to be written, now and perhaps again: it is not claimed.
+void check_output(const std::filesystem::path& file, const std::string& role);
+
 /// The same of a folder that the command fills. Throws InputError also where it is a file.
 void claim_folder(const std::filesystem::path& folder, const std::string& role);
 
@@ -37,7 +40,11 @@ class OwnOutputRead {
   OwnOutputRead& operator=(const OwnOutputRead&) = delete;
 };
 
-/// The file that a write to `target` changes: symbolic links are followed, also to a file that does not exist.
+/// The file that a write to `target` changes: symbolic links are followed, also to a file that does not exist. Throws
+/// InputError where they lead to each other.
 std::filesystem::path link_target(std::filesystem::path target);
+
+/// The current folder. Throws InputError where it was removed.
+std::filesystem::path current_folder();
 
 }  // namespace exmat

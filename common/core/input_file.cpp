@@ -5,6 +5,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <span>
 #include <string_view>
 #include <utility>
 
@@ -16,8 +17,9 @@ namespace {
 
 bool is_text(char c) { return (c >= 0x20 && c < 0x7f) || c == '\t' || c == '\r' || c == '\n'; }
 
-constexpr std::array<std::pair<std::string_view, std::string_view>, 11> kBeginnings{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 14> kBeginnings{
     {{"\x89HDF", "an HDF5 file (a bundle or a trajectory?)"},
+     {"exmatpk\n", "a pack of a bundle"},
      {"glTF", "a glTF file (.glb)"},
      {"Kaydara FBX", "an FBX file"},
      {"; FBX", "an FBX file"},
@@ -27,12 +29,22 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 11> kBeginni
      {"$MeshFormat", "a Gmsh mesh"},
      {"# vtk", "a VTK file"},
      {"MeshVersionFormatted", "a MEDIT mesh"},
-     {"ply", "a PLY surface"}}};
+     {"ply", "a PLY surface"},
+     {"solid", "an STL surface"},
+     {"*VERTICES", "a .veg mesh"}}};
+
+/// Files whose beginnings say nothing.
+constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kExtensions{{{".obj", "an .obj surface"},
+                                                                                    {".stl", "an STL surface"},
+                                                                                    {".veg", "a .veg mesh"},
+                                                                                    {".node", "a TetGen mesh"},
+                                                                                    {".ele", "a TetGen mesh"}}};
 
 constexpr std::string_view kFromBlender = "export it as .glb, as Blender does",
                            kFromMeshio = "convert it, as 'meshio convert IN OUT.msh' does",
                            kFromGmsh = "make tets of it, as 'gmsh -3 IN -o OUT.msh' does",
-                           kFromPython = "arrays go in from Python: exmat.write_msh or exmat.bundle";
+                           kFromPython =
+                               "arrays go in from Python: exmat.precompute.write_mesh or exmat.precompute.bundle";
 constexpr std::array<std::pair<std::string_view, std::string_view>, 26> kWays{
     {{".fbx", kFromBlender},
      {".blend", kFromBlender},
@@ -60,6 +72,13 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 26> kWays{
      {".npy", kFromPython},
      {".h5", "a bundle or a trajectory is no mesh: name the file that it was made of"},
      {".json", "an asset file is no mesh: name the file that it names"}}};
+
+std::string_view second_of(std::span<const std::pair<std::string_view, std::string_view>> pairs,
+                           std::string_view first) {
+  for (const auto& [own, second] : pairs)
+    if (own == first) return second;
+  return {};
+}
 
 /// Name of the encoding, for iconv, of text that is not in UTF-8; empty where nothing says so.
 std::string utf16_of(std::string_view bytes) {
@@ -100,10 +119,12 @@ std::string read_text_file(const std::filesystem::path& file, const std::string&
   return bytes;
 }
 
-std::string_view kind_of_file(std::string_view bytes) {
+std::string_view kind_of_file(const std::filesystem::path& file, std::string_view bytes) {
   for (const auto& [beginning, kind] : kBeginnings)
     if (bytes.starts_with(beginning)) return kind;
-  return {};
+  const std::size_t first = bytes.find_first_not_of(" \t\r\n");
+  if (first != std::string_view::npos && bytes[first] == '{') return kJson;
+  return second_of(kExtensions, lower_extension(file));
 }
 
 std::string lower_extension(const std::filesystem::path& file) {
@@ -113,11 +134,7 @@ std::string lower_extension(const std::filesystem::path& file) {
   return extension;
 }
 
-std::string way_from(const std::filesystem::path& file) {
-  const auto way =
-      std::ranges::find(kWays, lower_extension(file), &std::pair<std::string_view, std::string_view>::first);
-  return way == kWays.end() ? "" : std::string(way->second);
-}
+std::string way_from(const std::filesystem::path& file) { return std::string(second_of(kWays, lower_extension(file))); }
 
 void refuse_extension(const std::filesystem::path& file, const std::string& expected) {
   const std::string extension = lower_extension(file);

@@ -14,8 +14,12 @@ std::string read_whole_file(const std::filesystem::path& file, const std::string
 /// that are '\r' alone. Throws InputError where the text is UTF-16.
 std::string read_text_file(const std::filesystem::path& file, const std::string& expected);
 
-/// The file that begins with these bytes, for messages: "an HDF5 file"; empty where it is of no known kind.
-std::string_view kind_of_file(std::string_view bytes);
+/// The kind of `file`, which begins with these bytes, for messages: "an HDF5 file"; empty where it is of no known one.
+/// Its extension decides where the bytes say nothing.
+std::string_view kind_of_file(const std::filesystem::path& file, std::string_view bytes);
+
+/// The kind of all that begins as a JSON object does.
+inline constexpr std::string_view kJson = "a JSON file (a scene or an asset?)";
 
 /// The extension in lower case, with its point: ".obj" of "A.OBJ".
 std::string lower_extension(const std::filesystem::path& file);

@@ -6,11 +6,13 @@
 #include <fstream>
 #include <hdf5.h>
 #include <optional>
+#include <string_view>
 #include <system_error>
 #include <utility>
 
 #include "common/core/command_files.h"
 #include "common/core/error.h"
+#include "common/core/input_file.h"
 #include "common/core/saturating_product.h"
 #include "common/hdf5/hdf5_access.h"
 
@@ -63,6 +65,8 @@ struct Superblock {
            std::equal(kSignature.begin(), kSignature.begin() + static_cast<std::ptrdiff_t>(known), bytes.begin());
   }
 
+  std::string_view text() const { return {reinterpret_cast<const char*>(bytes.data()), size}; }
+
   // Expected end of the file; nothing for layouts that HDF5 has to judge itself.
   std::optional<std::uint64_t> end_of_file() const {
     const unsigned version = bytes[8];
@@ -96,7 +100,11 @@ void check_before_opening(const std::filesystem::path& file) {
   const std::uint64_t size = std::filesystem::file_size(file, ignored);
   const Superblock superblock = read_superblock(file);
   if (superblock.size == 0) throw InputError({name, "", "an HDF5 file", "an empty file", ""});
-  if (!superblock.has_signature()) throw InputError({name, "", "an HDF5 file", "another kind of file", ""});
+  if (!superblock.has_signature()) {
+    const std::string_view kind = kind_of_file(file, superblock.text());
+    throw InputError({name, "", "an HDF5 file", kind.empty() ? "another kind of file" : std::string(kind),
+                      "exmat-precompute bundle writes bundles, exmat-runtime run trajectories"});
+  }
   const auto end = superblock.size < Superblock::kSize ? std::nullopt : superblock.end_of_file();
   const std::uint64_t expected = end.value_or(Superblock::kSize);
   if (size >= expected) return;

@@ -144,6 +144,7 @@ void check_files(const BundleOptions& options) {
 void claim_outputs(const BundleOptions& options, const AssetConfig& asset, const std::optional<SceneConfig>& scene) {
   if (!options.alignment_report.empty()) precompute::claim_alignment_report(asset, options.alignment_report);
   if (!scene) return;
+  require_obstacle_files(*scene);
   for (const ObstacleConfig& obstacle : scene->obstacles) {
     if (const auto* mesh = std::get_if<MeshConfig>(&obstacle.shape)) check_input(mesh->file, "a surface");
     if (const auto* heights = std::get_if<HeightFieldConfig>(&obstacle.shape); heights && heights->file)

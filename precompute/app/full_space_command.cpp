@@ -32,7 +32,7 @@ void print_summary(const precompute::FullSpaceSummary& summary, const SceneConfi
 void full_space_command(const FullSpaceCommandOptions& options) {
   claim_trajectory(options.trajectory, "-o");
   SceneConfig config = load_scene(options.scene);
-  require_bundle(config);
+  require_files(config);
   if (options.steps) config.steps = *options.steps;
   if (options.every) config.every = *options.every;
   const precompute::FullSpaceSummary summary = precompute::write_full_space(config, options.trajectory);

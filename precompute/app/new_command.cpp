@@ -6,6 +6,7 @@
 #include "common/core/atomic_file.h"
 #include "common/core/command_files.h"
 #include "common/core/error.h"
+#include "common/core/input_file.h"
 #include "common/core/log.h"
 #include "precompute/inputs/assumed_asset.h"
 #include "precompute/inputs/assumed_scene.h"
@@ -25,7 +26,7 @@ void require_new(const std::filesystem::path& file) {
 void new_command(const NewCommandOptions& options) {
   const std::filesystem::path surface = options.surface;
   if (!precompute::is_surface_file(surface))
-    throw InputError({surface.string(), "", "a surface: .glb, .gltf, .obj, .ply or .stl", "another kind of file", ""});
+    refuse_extension(surface, "a surface with the extension .glb, .gltf, .obj, .ply or .stl");
   const std::string name = surface.stem().string();
   const std::filesystem::path folder = options.folder.empty() ? name : options.folder;
   const std::filesystem::path asset_file = folder / "asset.json", scene_file = folder / "scene.json";

@@ -8,6 +8,7 @@
 #include <string>
 #include <string_view>
 
+#include "common/core/command_files.h"
 #include "common/core/error.h"
 #include "common/core/input_file.h"
 #include "common/core/log.h"
@@ -82,7 +83,7 @@ bool is_surface_file(const std::filesystem::path& file) {
 
 Json assumed_asset(const std::filesystem::path& surface, const std::filesystem::path& folder) {
   const SurfaceFile file = read_surface_file(surface);
-  const auto here = std::filesystem::current_path();  // absolute() refuses an empty path
+  const auto here = current_folder();  // absolute() refuses an empty path
   const auto path = (here / surface).lexically_normal().lexically_proximate((here / folder).lexically_normal());
   Json asset = {{"name", cut(surface.stem().string(), kLongestName)},
                 {"object",

@@ -425,6 +425,7 @@ ObjectInput read_object(const AssetConfig& asset, InputFiles& files) {
 }
 
 ObjectInput read_object(const AssetConfig& asset, InputFiles& files, StageCache& cache) {
+  require_files(asset);
   ObjectInput object;
   MeshFile file;
   if (asset.object_surface) {

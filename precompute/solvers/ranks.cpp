@@ -16,6 +16,7 @@
 #include <system_error>
 #include <thread>
 
+#include "common/core/command_files.h"
 #include "precompute/solvers/solver_access.h"
 #include "precompute/solvers/team.h"
 
@@ -234,15 +235,6 @@ std::string word_of(std::string name) {
   return "--" + name;
 }
 
-/// PETSc asks for the path of the current folder, and ends the program where there is none.
-void require_current_folder() {
-  std::error_code error;
-  static_cast<void>(std::filesystem::current_path(error));
-  if (error)
-    throw InputError({"current folder", "", "a folder that exists", error.message(),
-                      "it was removed or moved: change to another folder, and name files from there"});
-}
-
 }  // namespace
 
 // PETSc and MPI cannot be started a second time, so they end with the program.
@@ -250,7 +242,7 @@ void start_solvers() {
   static const bool started = [] {
     set_environment();
     prepare_blas();
-    require_current_folder();
+    static_cast<void>(current_folder());  // PETSc asks for its path, and ends the program where there is none
     for (const char* name : {"PETSC_OPTIONS", "PETSC_OPTIONS_YAML"}) unsetenv(name);
     // A file .petscrc beside the user could load a library. Signals are the program's matter (common/console).
     std::array<char*, 4> words{const_cast<char*>("exmat"), const_cast<char*>("-skip_petscrc"),

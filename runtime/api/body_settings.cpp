@@ -40,6 +40,10 @@ std::size_t exmat_body::example_force(std::int64_t region) const {
   const bool whole = region == -1 && model.has_whole_body_examples();
   if (model.examples.empty())
     throw InvalidArgument("the model has no example force: set use_examples, or let its scene have examples");
+  if (region == -1 && !whole)
+    throw InvalidArgument(
+        fmt::format("the model has examples of its {} regions alone, none of the whole body: expected one of these",
+                    model.region_count()));
   if (!whole && model.region(region) == nullptr)
     throw InvalidArgument(fmt::format("region = {}: the model has {}{} regions", region,
                                       model.has_whole_body_examples() ? "the whole body (-1) and " : "",
@@ -90,7 +94,7 @@ exmat_status exmat_body_set_space(exmat_body* body, std::int32_t space) noexcept
         "full or auto",
         __func__);
   if (space != EXMAT_SPACE_FULL && body->model().skeleton)
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: space = %" PRId32 ": expected EXMAT_SPACE_FULL: the body is on a skeleton",
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: space = %" PRId32 ": expected full space: the body is on a skeleton",
                 __func__, space);
   const bool in_modes = space == EXMAT_SPACE_REDUCED;
   const bool held = is_held(body->state.attachments) || body->world->world.is_attached(place_of(*body));

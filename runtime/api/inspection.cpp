@@ -128,16 +128,13 @@ exmat_status exmat_body_read_target(const exmat_body* body, std::int64_t region,
   EXMAT_REQUIRE(body);
   EXMAT_REQUIRE(q);
   EXMAT_REQUIRE_LENGTH(modes, body->modes());
-  const ExampleModel* force = example_force(body->model(), region);
-  if (force == nullptr)
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: region = %" PRId64 ": the model has no such example force", __func__,
-                region);
   return guarded(__func__, [&] {
-    const std::size_t place = force_place(force, body->model());
+    const std::size_t place = body->example_force(region);
+    const ExampleModel& force = body->model().examples[place];
     const ExampleState& state = body->state.examples[place];
     const ExampleSettings& settings = body->scene.examples[place];
-    const bool is_found = force->table ? body->state.step > 0 && !settings.elastic : state.has_target;
-    const Eigen::VectorXd pull = is_found && acts(settings) ? pull_of(*force, state) : Eigen::VectorXd::Zero(modes);
+    const bool is_found = force.table ? body->state.step > 0 && !settings.elastic : state.has_target;
+    const Eigen::VectorXd pull = is_found && acts(settings) ? pull_of(force, state) : Eigen::VectorXd::Zero(modes);
     std::copy_n(pull.data(), modes, q);
   });
 }

@@ -35,8 +35,8 @@ RowMatrix rows_of(const Source& source, const Ids& ids) {
 exmat_status require_rows(const char* function, const PointSet& points) noexcept {
   if (points.basis_rows.rows() > 0) return EXMAT_OK;
   return fail(EXMAT_INVALID_ARGUMENT,
-              "%s: points of exmat_points_create_all_vertices() can only be read, in single precision; "
-              "exmat_points_create_vertices() makes those that can be pushed",
+              "%s: points that were made as all vertices can only be read, in single precision; make points of "
+              "vertices by their ids, which can be pushed",
               function);
 }
 

@@ -33,8 +33,8 @@ exmat_settings completed(const exmat_settings* given) {
   const std::size_t size = given->size;
   if (size < kSettingsSizes.first || size > kMostStructBytes)
     throw InvalidArgument(
-        fmt::format("settings.size = {}: expected {}, sizeof(exmat_settings); call "
-                    "exmat_settings_default() first",
+        fmt::format("settings.size = {}: expected {}, sizeof(exmat_settings); begin "
+                    "with the default settings",
                     size, sizeof settings));
   const auto* const bytes = reinterpret_cast<const unsigned char*>(given);
   if (size > sizeof settings && std::any_of(bytes + sizeof settings, bytes + size, [](auto byte) { return byte != 0; }))

@@ -76,6 +76,7 @@ void was_put(exmat_body& body) noexcept {
   world.world.forget(place_of(body));
   std::erase_if(world.contacts,
                 [&](const exmat_body_contact& contact) { return contact.body == body.id || contact.other == body.id; });
+  world.touches.forget(body.id);
 }
 
 void follow_times(exmat_world& world, double time_before) noexcept {
@@ -139,7 +140,7 @@ std::shared_ptr<const TouchingSurface> surface_of(exmat_world& world, const std:
 }
 
 void check_joins(const exmat_world& world, const exmat_body& body) {
-  if (world.is_own) throw InvalidArgument("world: expected one of exmat_world_create(), found a body's own");
+  if (world.is_own) throw InvalidArgument("world: expected one that was created, found a body's own");
   if (!body.own) throw InvalidArgument("the body is in a world already");
   if (world.law.apart == 0 && !body.model().contact)
     throw InvalidArgument("the model knows no contact: expected settings with use_contact, or a scene with obstacles");

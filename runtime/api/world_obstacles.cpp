@@ -81,8 +81,8 @@ Shape shape_of(const exmat_obstacle& obstacle) {
                      length_of(obstacle.radius, "radius")};
     case EXMAT_MESH:
     case EXMAT_HEIGHT_FIELD:
-      throw InvalidArgument(
-          fmt::format("obstacle.shape = {}: it is made of arrays: expected exmat_world_add_shape()", obstacle.shape));
+      throw InvalidArgument(fmt::format(
+          "obstacle.shape = {}: it is made of arrays: expected the shape that was made of them", obstacle.shape));
     default:
       throw InvalidArgument(fmt::format("obstacle.shape = {}: expected {} to {}", obstacle.shape,
                                         static_cast<int>(EXMAT_PLANE), static_cast<int>(EXMAT_CAPSULE)));
@@ -208,6 +208,8 @@ void forget(std::size_t place, ContactState& contacts) {
 /// After the list of its obstacles has changed: what is sized by their number follows.
 void fit(exmat_body& body) {
   const std::size_t count = body.scene.obstacles.size();
+  constexpr std::size_t kTouchesOfABody = 4;
+  body.world->touches.reserve(kTouchesOfABody * body.world->members.size());
   body.contacts.prepare(body.model(), count);
   prepare_contacts(body.model(), count, body.start);
   body.world->world.fit(place_of(body));

@@ -319,6 +319,7 @@ void visit_snapshot(Archive& archive, World& world) {
     world.world.set_full_bodies(most_full);
     world.world.take_states();
     world.contacts.clear();
+    world.touches.clear();
   }
 }
 
@@ -379,7 +380,7 @@ std::span<const double> numbers_of(const void* buffer, std::size_t size, const e
   const Header own;
   if (size >= sizeof header) std::memcpy(&header, buffer, sizeof header);
   if (size < sizeof header || std::memcmp(header.format, own.format, sizeof header.format) != 0)
-    throw InvalidArgument("buffer: expected a snapshot of exmat_world_save()");
+    throw InvalidArgument("buffer: expected a snapshot, as the world saves it");
   if (header.version != own.version)
     throw InvalidArgument(fmt::format("buffer: version {}: expected {}: it was saved by another version of the library",
                                       header.version, own.version));
@@ -413,6 +414,7 @@ void set_world(std::span<const double> numbers, exmat_world& world) {
     member.body->state.begins_anew |= holds_modes(member.body->state.attachments);  // whose past it does not hold
   world.world.take_states();
   world.contacts.clear();
+  world.touches.clear();
   follow_times(world, time);
 }
 

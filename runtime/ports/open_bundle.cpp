@@ -32,7 +32,7 @@ std::string read(const std::filesystem::path& file) {
 }  // namespace
 
 // open_bundle() says as much of a pack that is not there.
-void require_bundle(const SceneConfig&) {}
+void require_files(const SceneConfig&) {}
 
 std::unique_ptr<BundleStore> open_bundle(const BundleInput& input) {
   auto pack = input.pack() ? input.pack() : std::make_shared<const std::string>(read(input.file()));

@@ -384,7 +384,7 @@ void describe_examples(const ExampleModel& examples, const ExampleSettings& sett
 BundleInput bundle_of(const SceneConfig& config) { return {config.bundle, config.pack}; }
 
 LoadedScene load_run(const SceneConfig& config, const Obstacles* obstacles) {
-  require_bundle(config);
+  require_files(config);
   LoadedScene loaded;
   loaded.summary = summarise_bundle(bundle_of(config));
   check_body(config, loaded.summary.constrained);

@@ -6,6 +6,7 @@
 #include <span>
 #include <utility>
 
+#include "common/core/command_files.h"
 #include "common/core/progress.h"
 #include "common/core/timer.h"
 #include "runtime/output/trajectory.h"
@@ -18,9 +19,11 @@ namespace {
 
 TrajectoryInfo trajectory_info(const LoadedScene& kind, std::size_t number, const SceneConfig& scene,
                                const WorldConfig& config) {
-  const std::filesystem::path folder = std::filesystem::absolute(*config.trajectory).parent_path();
-  const std::string bundle =
-      std::filesystem::proximate(std::filesystem::absolute(scene.bundle), folder).generic_string();
+  const auto absolute = [](const std::filesystem::path& file) {
+    return file.is_absolute() ? file : current_folder() / file;
+  };
+  const std::filesystem::path folder = absolute(*config.trajectory).parent_path();
+  const std::string bundle = std::filesystem::proximate(absolute(scene.bundle), folder).generic_string();
   TrajectoryInfo info{std::string(name_of(scene.integrator)), bundle, config.time_step,
                       1 + config.steps / config.every};
   for (std::size_t i = 0; i < kind.scene.examples.size(); ++i) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <fmt/format.h>
 
+#include "common/config/scene_needs.h"
 #include "common/core/error.h"
 #include "runtime/scene/attachment_loader.h"
 #include "runtime/scene/obstacle_loader.h"
@@ -80,6 +81,7 @@ std::shared_ptr<const TouchingSurface> touching_surface(const Model& model, cons
 LoadedWorld load_world_run(const WorldConfig& config) {
   LoadedWorld world;
   world.kinds.reserve(config.bodies.size());
+  require_files(config.bodies.front().scene);
   world.obstacles = make_obstacles(config.bodies.front().scene.obstacles, config.contact.release);
   for (const BodiesConfig& bodies : config.bodies) {
     LoadedKind& kind = world.kinds.emplace_back(LoadedKind{load_run(bodies.scene, &world.obstacles), nullptr});

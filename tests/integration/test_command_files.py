@@ -195,6 +195,13 @@ class Commands(unittest.TestCase):
     def test_an_unchanged_bundle_is_its_own_output(self):
         self.assertIn("nothing to do", self.command("bundle", "asset.json", "-o", "bar.h5", "--if-changed"))
 
+    def test_links_that_lead_to_each_other_are_refused(self):
+        (self.folder / "a").symlink_to("b")
+        (self.folder / "b").symlink_to("a")
+        for option in ("-o", "--dump-state"):
+            self.refused("run", "scene.json", option, "a", said=["a: expected a name, or links that lead to one, found links that lead to each other"])
+        self.assertEqual([os.readlink(self.folder / name) for name in ("a", "b")], ["b", "a"])
+
     def test_a_link_stays_a_link(self):
         (self.folder / "link.h5").symlink_to("real.h5")
         for _ in range(2):
@@ -215,12 +222,16 @@ class Commands(unittest.TestCase):
 
     def test_a_folder_that_is_gone_is_said(self):
         gone = self.folder / "gone"
-        gone.mkdir()
-        script = 'rmdir "$1"; exec "$2" bundle "$3"/asset.json -o "$3"/new.h5'
-        done = subprocess.run(["bash", "-c", script, "bash", gone, PRECOMPUTE, self.folder], cwd=gone, capture_output=True, text=True)
-        self.assertEqual(done.returncode, 2, done.stderr)
-        self.assertIn("current folder: expected a folder that exists", done.stderr)
-        self.assertFalse((self.folder / "new.h5").exists())
+        before = self.contents()
+        for program, *words in ((PRECOMPUTE, "bundle", self.folder / "asset.json", "-o", self.folder / "new.h5"),
+                                (PRECOMPUTE, "new", self.folder / "surface.obj"),
+                                (PRECOMPUTE, "new", self.folder / "surface.obj", "-o", self.folder / "begin"),
+                                (RUNTIME, "run", self.folder / "scene.json", "-o", "t.h5")):
+            gone.mkdir()
+            done = subprocess.run(["bash", "-c", 'rmdir "$1"; shift; exec "$@"', "bash", gone, program, *words], cwd=gone, capture_output=True, text=True)
+            self.assertEqual(done.returncode, 2, done.stderr)
+            self.assertIn("current folder: expected a folder that exists", done.stderr)
+        self.assertEqual(self.contents(), before)
 
     def test_a_full_standard_output_is_a_failure(self):
         with open("/dev/full", "w") as full:
@@ -275,6 +286,9 @@ class Commands(unittest.TestCase):
             self.assertIn("an empty one", self.command("bundle", "asset.json", *output, option, "", status=2))
         for option in ("-o", "--dump-state", "--from-state"):
             self.assertIn("an empty one", self.command("run", "scene.json", option, "", status=2))
+        for words in (["--stability", ""], [""]):  # in a group of options
+            errors = self.command("study", *words, "-o", "s", status=2)
+            self.assertIn(f"{'--stability' if words[0] else 'STUDY'}: expected a value, found an empty one", errors)
         for value in ("nan", "NaN", "-nan", "inf", "0", "-1", "1e400"):
             self.assertIn(f"found '{value}'", self.command("bundle", "asset.json", "-o", "new.h5", f"--training-budget={value}", status=2))
         self.assertIn("found 'nan'", self.command("mesh", "surface.obj", "-o", "new.msh", "--cell-size", "nan", status=2))
@@ -285,12 +299,53 @@ class Commands(unittest.TestCase):
             return subprocess.run([PRECOMPUTE, *words], capture_output=True, text=True).stderr
         self.assertIn("did you mean bundle?", said("bundel", "asset.json"))
         self.assertIn("-o,--output is required", said("bundle", "asset.json"))
+        for words, option, nearest in ((["bundle", "a.json", "--ouput", "x.h5"], "--ouput", "--output"),
+                                       (["bundle", "a.json", "-o", "x.h5", "--cahce=y"], "--cahce", "--cache"),
+                                       (["study", "--stabilty", "scene.json", "-o", "s"], "--stabilty", "--stability"),
+                                       (["check", "a.json", "--thread", "2"], "--thread", "--threads")):
+            self.assertIn(f"there is no option '{option}'; did you mean {nearest}?", said(*words))
+        self.assertIn("there is no option '--zzzzzzzz'; see", said("check", "a.json", "--zzzzzzzz"))
 
     def test_a_missing_bundle_is_said_by_the_scenes_member(self):
         write_json(self.folder / "lost.json", {"bundle": "lost.h5"})
         for command in (["run", "lost.json"], ["bench", "lost.json"], ["full-space", "lost.json", "-o", "t.h5"]):
             errors = self.command(*command, status=2)
             self.assertIn("lost.json: /bundle: expected a bundle, found no such file", errors)
+
+    def test_a_missing_file_is_said_by_the_member_that_names_it(self):
+        scene, asset = (json.loads((self.folder / name).read_text()) for name in ("scene.json", "asset.json"))
+        heights = {"file": "lost.csv", "spacing": [1, 1]}
+        for members, said in (({"obstacles": [{"plane": {"normal": [0, 0, 1]}}, {"mesh": {"file": "lost.obj"}}]},
+                               "/obstacles/1/mesh/file: expected a surface, found no such file: lost.obj"),
+                              ({"obstacles": [{"height_field": heights}]},
+                               "/obstacles/0/height_field/file: expected a text file of heights, found no such file: lost.csv"),
+                              ({"forces": [{"vertices": {"file": "lost.txt"}, "force": [0, 0, 1]}]},
+                               "/forces/0/vertices/file: expected a text file of vertex ids, found no such file: lost.txt")):
+            write_json(self.folder / "lost.json", {**scene, **members})
+            self.refused("run", "lost.json", said=["lost.json: " + said])
+            self.refused("bundle", "asset.json", "--scene", "lost.json", "-o", "new.h5", said=["lost.json: " + said])
+        pose = {"name": "bent", "mesh": "lost.veg"}
+        for members, said in (({"object": {**asset["object"], "mesh": "lost.veg"}}, "/object/mesh: expected a mesh of tets, found no such file: lost.veg"),
+                              ({"object": {**asset["object"], "render_mesh": "lost.obj"}},
+                               "/object/render_mesh: expected a surface, found no such file: lost.obj"),
+                              ({"examples": [{"name": "rest", "mesh": "bar.veg", "rest": True}, pose]},
+                               "/examples/1/mesh: expected a mesh of tets, found no such file: lost.veg")):
+            write_json(self.folder / "lost.json", {**asset, **members})
+            self.refused("check", "lost.json", said=["lost.json: " + said])
+
+    def test_other_files_are_called_by_their_kinds(self):
+        self.command("pack", "bar.h5", "-o", "bar.exmat")
+        (self.folder / "ascii.stl").write_text("solid x\nendsolid x\n")
+        for name, kind in (("surface.obj", "an .obj surface"), ("ascii.stl", "an STL surface"), ("bar.veg", "a .veg mesh"), ("bar.exmat", "a pack of a bundle"),
+                           ("bar.h5", "an HDF5 file")):
+            self.refused("run", name, said=[f"{name}: expected a JSON file, found {kind}", "a scene names its bundle in a JSON file"])
+        for name, kind in (("surface.obj", "an .obj surface"), ("scene.json", "a JSON file (a scene or an asset?)")):
+            for words in (["info", name], ["export", name, "-o", "x.glb"], ["pack", name, "-o", "x.exmat"]):
+                self.refused(*words, said=[f"{name}: expected an HDF5 file, found {kind}; exmat-precompute bundle writes bundles"])
+        self.refused("export", "bar.exmat", "-o", "x.glb", said=["found a pack of a bundle"])
+        self.refused("new", "asset.json", said=["asset.json: expected a surface with the extension", "found '.json'"])
+        (self.folder / "x.npz").write_bytes(b"PK\3\4")
+        self.refused("bundle", "x.npz", "-o", "new.h5", said=["exmat.precompute.write_mesh or exmat.precompute.bundle"])
 
     def test_depfiles_hold_every_path_that_make_can_read(self):
         odd = self.folder / "a b#c$d:e"

@@ -150,7 +150,7 @@ class Surfaces(unittest.TestCase):
         self.run_program("new", "loose.glb")
         scene = json.loads((self.folder / "loose/scene.json").read_text())
         self.assertAlmostEqual(scene["obstacles"][0]["plane"]["point"][1], self.points[:, 1].min(), places=6)
-        self.assertIn("a surface: .glb", self.run_program("new", "tube/asset.json", status=2))
+        self.assertIn("a surface with the extension .glb", self.run_program("new", "tube/asset.json", status=2))
 
     def test_targets_as_exporters_write_them(self):
         """The rest shape as a target, names that no bundle can hold, vertices of no triangle."""

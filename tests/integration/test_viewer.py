@@ -279,6 +279,27 @@ class Viewer(unittest.TestCase):
         bad = self.write("bad.json", {"actions": [{"time": 0, "grab": {"hand": "a"}}]})
         self.assertIn("/actions/0/grab", self.view(scene, "--script", bad, status=2))
 
+    def test_writes_over_none_of_its_files(self):
+        scene = self.write("ground_scene.json", {"bundle": "bar.h5", "obstacles": [{"mesh": {"file": "ground.obj", "thickness": 0.1}}]})
+        (self.folder / "ground.obj").write_text("v -9 -9 -3\nv 9 -9 -3\nv 0 9 -3\nf 1 2 3\n")
+        script = self.write("still.json", {"actions": []})
+        (self.folder / "link.png").symlink_to("bar.h5")
+        before = {path: path.read_bytes() for path in self.folder.iterdir() if path.is_file()}
+        for option in ("--screenshot", "--save-scene", "--dump"):
+            for name in ("bar.h5", "link.png", "ground_scene.json", "ground.obj", "still.json"):
+                said = self.view(scene, "--script", script, "--frames", 1, option, self.folder / name, status=2)
+                self.assertIn(f"{name}: {option}: expected a file that this command does not read", said)
+        movie = self.folder / "bar.gif"
+        movie.symlink_to("bar.h5")
+        if shutil.which("ffmpeg"):
+            self.assertIn("--record: expected a file that this command does not read", self.view(scene, "--record", movie, status=2))
+        pictures = self.folder / "pictures"
+        said = self.view(scene, "--record", pictures, "--dump", pictures, status=2)
+        self.assertIn("pictures: --dump: expected a file of its own, found that of --record", said)
+        self.assertIn("bar.h5: --screenshot", self.view(self.folder / "bar.h5", "--screenshot", self.folder / "bar.h5", status=2))
+        movie.unlink()
+        self.assertEqual({path: path.read_bytes() for path in self.folder.iterdir() if path.is_file()}, before)
+
     def test_memory_does_not_grow(self):
         most = []
         for frames in (20, 200):

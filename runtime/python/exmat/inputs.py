@@ -46,10 +46,9 @@ def write_asset(asset: Union[StrPath, Mapping[str, Any]], folder: pathlib.Path) 
     _take_object(given, members.get("object", {}), folder)
     _take_surfaces(given, examples, members, folder)
     for place, example in enumerate(examples):
-        if "mesh" not in example:
-            continue
-        tets = _tets_of_poses(examples, given)
-        members["examples"][place]["mesh"] = _mesh_file(example.get("mesh"), folder / f"example_{place}.vtk", tets, f"examples[{place}].mesh")
+        if "mesh" in example:
+            path, name = folder / f"example_{place}.vtk", f"examples[{place}].mesh"
+            members["examples"][place]["mesh"] = _mesh_file(example["mesh"], path, _mesh_of_poses(examples, given), name)
     return _write_json(folder / "asset.json", members)
 
 
@@ -95,14 +94,17 @@ def _take_surfaces(given: Any, examples: Any, members: Dict[str, Any], folder: p
     members["object"]["surface"] = str(folder / "surface.glb")
 
 
-def _mesh_file(mesh: Any, path: pathlib.Path, tets: Optional[Any], place: str) -> Any:
+def _mesh_file(mesh: Any, path: pathlib.Path, posed: Optional[Tuple[Any, Any]], place: str) -> Any:
     if mesh is None or isinstance(mesh, (str, os.PathLike)):
         return None if mesh is None else os.path.abspath(mesh)
     if not isinstance(mesh, (tuple, Mapping)):
-        if tets is None:
+        if posed is None:
             raise InvalidArgument(f"{place}: expected (vertices, tets), or vertices alone where the rest example or the object is given so; "
                                   "found vertices alone")
-        mesh = (mesh, tets)
+        expected, found = (len(array(vertices, place, 3, "f8")) for vertices in (posed[0], mesh))
+        if found != expected:
+            raise InvalidArgument(f"{place}: expected {expected} vertices, as the mesh has that it is a pose of, found {found}")
+        mesh = (mesh, posed[1])
     return _written(write_mesh, path, _pair(mesh, place, "tets"), place)
 
 
@@ -123,13 +125,11 @@ def _pair(mesh: Any, place: str, cells: str) -> Tuple[Any, Any]:
     raise InvalidArgument(f"{place}: expected a path or (vertices, {cells})")
 
 
-def _tets_of_poses(examples: Any, given: Any) -> Optional[Any]:
-    """Tets that vertices alone stand for: those of the rest example, of the object where there is none."""
+def _mesh_of_poses(examples: Any, given: Any) -> Optional[Tuple[Any, Any]]:
+    """The mesh in arrays that vertices alone are a pose of: the rest example, the object where there is none."""
     rest = next((example.get("mesh") for example in examples if example.get("rest")), None)
     mesh = given.get("mesh") if rest is None else rest
-    if isinstance(mesh, (tuple, Mapping)):
-        return _pair(mesh, "mesh", "tets")[1]
-    return None
+    return _pair(mesh, "mesh", "tets") if isinstance(mesh, (tuple, Mapping)) else None
 
 
 def plain_members(value: Any) -> Any:

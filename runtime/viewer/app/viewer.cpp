@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "common/core/atomic_file.h"
+#include "common/core/command_files.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
 #include "runtime/viewer/app/dump.h"
@@ -28,6 +29,22 @@ std::vector<SceneDocument> open_documents(const Options& options) {
   for (std::size_t i = 1; i < options.files.size(); ++i)
     documents.push_back(documents.front().with_bundle(options.files[i]));
   return documents;
+}
+
+/// Before anything is read: a file that is then read is refused.
+void claim_outputs(const Options& options) {
+  if (options.record) claim_recording(*options.record);
+  if (options.screenshot) claim_output(*options.screenshot, "--screenshot");
+  if (options.save_scene) claim_output(*options.save_scene, "--save-scene");
+  if (options.dump) claim_output(*options.dump, "--dump");
+}
+
+/// Names what the library will read, which knows nothing of the outputs, and says itself what is missing.
+void check_inputs(const std::vector<SceneDocument>& documents) {
+  std::error_code ignored;
+  for (const SceneDocument& document : documents)
+    for (const std::filesystem::path& file : document.files())
+      if (std::filesystem::exists(file, ignored)) check_input(file, "a file of the scene");
 }
 
 std::vector<ShownBody> shown_bodies(const Studio& studio) {
@@ -186,9 +203,11 @@ void run_by_itself(const Options& options, Show& show, Studio& studio) {
 }  // namespace
 
 void run(const Options& options) {
-  if (options.record) check_recording(*options.record);
+  claim_outputs(options);
   if (options.script) load_script(*options.script);  // its faults before anything is made
-  Simulation simulation(open_documents(options), options.object_surface ? EXMAT_SURFACE_OBJECT : EXMAT_SURFACE_AUTO);
+  std::vector<SceneDocument> documents = open_documents(options);
+  check_inputs(documents);
+  Simulation simulation(std::move(documents), options.object_surface ? EXMAT_SURFACE_OBJECT : EXMAT_SURFACE_AUTO);
   Studio studio(simulation);
   studio.interface = !options.hide_interface;
   Show show(options, studio);

@@ -16,10 +16,13 @@
 #pragma GCC diagnostic pop
 
 #include "common/core/atomic_file.h"
+#include "common/core/command_files.h"
 #include "common/core/error.h"
 
 namespace exmat::viewer {
 namespace {
+
+constexpr const char* kOption = "--record";
 
 bool is_movie(const std::filesystem::path& target) {
   return target.extension() == ".mp4" || target.extension() == ".gif";
@@ -62,10 +65,15 @@ void check_recording(const std::filesystem::path& target) {
   const std::string extension = target.extension().string();
   if (!extension.empty() && !is_movie(target) && !std::filesystem::is_directory(target))
     throw InputError(
-        {"--record", "", "a folder, or a movie by its extension: .mp4 or .gif", '"' + target.string() + '"', ""});
+        {kOption, "", "a folder, or a movie by its extension: .mp4 or .gif", '"' + target.string() + '"', ""});
   if (is_movie(target) && !has_ffmpeg())
-    throw InputError({"--record", "", "ffmpeg, which makes movies, among the programs", "none",
+    throw InputError({kOption, "", "ffmpeg, which makes movies, among the programs", "none",
                       "install it (apt-get install ffmpeg), or name a folder for pictures"});
+}
+
+void claim_recording(const std::filesystem::path& target) {
+  check_recording(target);
+  is_movie(target) ? claim_output(target, kOption) : claim_folder(target, kOption);
 }
 
 Recording::Recording(const std::filesystem::path& target, double frame_rate, const PictureSize& size)
@@ -88,7 +96,9 @@ Recording::~Recording() {
 
 void Recording::add(const Picture& picture) {
   if (movie_ == nullptr) {
-    write_png(picture, target_ / fmt::format("{:05}.png", frames_++));
+    const std::filesystem::path file = target_ / fmt::format("{:05}.png", frames_++);
+    check_output(file, kOption);
+    write_png(picture, file);
     return;
   }
   ++frames_;

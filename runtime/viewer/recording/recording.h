@@ -36,4 +36,7 @@ class Recording {
 /// Throws InputError where nothing can be recorded there, before anything is computed.
 void check_recording(const std::filesystem::path& target);
 
+/// Claims the folder or the movie as an output of the command.
+void claim_recording(const std::filesystem::path& target);
+
 }  // namespace exmat::viewer

@@ -107,24 +107,16 @@ Json obstacle_json(const PlacedObstacle& placed, const Json& scene) {
   return json;
 }
 
-/// The member that names a file in `from`'s folder, as seen from that of `to`.
-void make_relative(Json& json, const char* member, const std::filesystem::path& from, const std::filesystem::path& to) {
-  if (!json.contains(member)) return;
-  const std::filesystem::path whole = std::filesystem::absolute(from.parent_path() / json[member].get<std::string>());
-  json[member] = std::filesystem::proximate(whole, std::filesystem::absolute(to).parent_path()).generic_string();
-}
-
-/// Makes file names relative in a scene of one body, or in an entry of "bodies".
-void make_body_relative(Json& json, const std::filesystem::path& from, const std::filesystem::path& to) {
-  make_relative(json, "bundle", from, to);
-  make_relative(json, "poses", from, to);
-  if (!json.contains("forces")) return;
-  for (Json& force : json["forces"]) make_relative(force["vertices"], "file", from, to);
-}
-
-void make_obstacle_relative(Json& json, const std::filesystem::path& from, const std::filesystem::path& to) {
-  for (const char* shape : {"mesh", "height_field"})
-    if (json.contains(shape)) make_relative(json[shape], "file", from, to);
+/// Calls `act` with the name of each file that a scene names, wherever in it.
+template <typename Act>
+void for_each_file(Json& json, const Act& act) {
+  for (const auto& [member, value] : json.items()) {
+    const bool is_file = member == "bundle" || member == "poses" || member == "file";
+    if (json.is_object() && is_file && value.is_string())
+      act(value);
+    else if (value.is_structured())
+      for_each_file(value, act);
+  }
 }
 
 bool moves_by_script(const Json& json) {
@@ -225,19 +217,24 @@ void SceneDocument::set(const Settings& settings, std::size_t kind) {
     put_force(force.region.empty() ? own["examples"] : own["regions"][region++], force);
 }
 
+std::vector<std::filesystem::path> SceneDocument::files() const {
+  std::vector<std::filesystem::path> files;
+  Json json = json_;
+  for_each_file(json, [&](const Json& name) { files.push_back(path_.parent_path() / name.get<std::string>()); });
+  return files;
+}
+
 void SceneDocument::save(const std::filesystem::path& file, std::int64_t steps,
                          std::span<const PlacedObstacle> obstacles) const {
   Json json = json_;
   json["steps"] = std::max<std::int64_t>(steps, 1);
-  if (is_world())
-    for (Json& body : json["bodies"]) make_body_relative(body, path_, file);
-  else
-    make_body_relative(json, path_, file);
   json.erase("obstacles");
-  for (const PlacedObstacle& placed : obstacles) {
-    json["obstacles"].push_back(obstacle_json(placed, json_));
-    make_obstacle_relative(json["obstacles"].back(), path_, file);
-  }
+  for (const PlacedObstacle& placed : obstacles) json["obstacles"].push_back(obstacle_json(placed, json_));
+  const auto folder = std::filesystem::absolute(file).parent_path();
+  for_each_file(json, [&](Json& name) {
+    const auto whole = std::filesystem::absolute(path_.parent_path() / name.get<std::string>());
+    name = std::filesystem::proximate(whole, folder).generic_string();
+  });
   check_against_schema(json, "scene", file);
   write_file_atomically(file, json.dump(2) + "\n");
 }

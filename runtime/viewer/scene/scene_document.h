@@ -41,6 +41,8 @@ class SceneDocument {
   /// Name of a kind of its bodies, or of its bundle.
   std::string kind_name(std::size_t kind) const;
   std::filesystem::path bundle(std::size_t kind = 0) const;
+  /// All files that it names: bundles, places of bodies, ids of vertices, obstacles.
+  std::vector<std::filesystem::path> files() const;
   const Json& json() const { return json_; }
   std::string text() const { return json_.dump(); }
 

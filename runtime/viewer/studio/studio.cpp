@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 #include <utility>
 
+#include "common/core/command_files.h"
+
 namespace exmat::viewer {
 namespace {
 
@@ -145,6 +147,7 @@ void Studio::remove_obstacle(std::size_t obstacle) {
 
 void Studio::save_scene(const std::filesystem::path& file) {
   try {
+    check_output(file, "Save");
     runner_.with([&](Simulation& simulation) { simulation.save_scene(file); });
     say(fmt::format("saved: {}", file.string()));
   } catch (const std::exception& error) {

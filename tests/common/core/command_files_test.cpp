@@ -121,10 +121,30 @@ TEST(LinkTarget, IsThePathThatAWriteChanges) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder.path() / "sub");
   std::filesystem::create_symlink("../new", folder.path() / "sub/link");
-  std::filesystem::create_symlink("loop", folder.path() / "loop");
   EXPECT_EQ(link_target(folder.path() / "plain"), folder.path() / "plain");
   EXPECT_EQ(link_target(folder.path() / "sub/link"), folder.path() / "sub/../new");
-  EXPECT_EQ(link_target(folder.path() / "loop"), folder.path() / "loop");  // and ends
+}
+
+TEST(LinkTarget, RefusesLinksThatLeadToEachOther) {
+  const TemporaryFolder folder;
+  std::filesystem::create_symlink("b", folder.path() / "a");
+  std::filesystem::create_symlink("a", folder.path() / "b");
+  const CommandFiles files;
+  EXPECT_THAT(refusal_of([&] { link_target(folder.path() / "a"); }), HasSubstr("found links that lead to each other"));
+  EXPECT_THAT(refusal_of_output(folder.path() / "a"), HasSubstr("found links that lead to each other"));
+  EXPECT_TRUE(std::filesystem::is_symlink(folder.path() / "a"));
+}
+
+TEST(CommandFiles, CheckOutputsWithoutClaimingThem) {
+  const TemporaryFolder folder;
+  const auto mesh = folder.write("mesh", "x"), other = folder.path() / "other";
+  const CommandFiles files;
+  check_input(mesh, "a mesh");
+  EXPECT_THAT(refusal_of([&] { check_output(mesh, "Save"); }), HasSubstr("Save: expected a file that this command"));
+  EXPECT_THAT(refusal_of([&] { check_output(folder.path(), "Save"); }), HasSubstr("found a folder"));
+  for (int time = 0; time < 2; ++time) EXPECT_EQ(refusal_of([&] { check_output(other, "Save"); }), "");
+  EXPECT_EQ(refusal_of_output(other), "");
+  EXPECT_THAT(refusal_of([&] { check_output(other, "Save"); }), HasSubstr("that of -o"));
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "common/bundle/pack_store.h"
 #include "common/core/error.h"
 #include "tests/support/temporary_folder.h"
 
@@ -45,11 +46,20 @@ TEST(ReadTextFile, RefusesUtf16) {
 }
 
 TEST(KindOfFile, IsToldByTheFirstBytes) {
-  EXPECT_THAT(kind_of_file("\x89HDF\r\n\x1a\n"), HasSubstr("HDF5"));
-  EXPECT_THAT(kind_of_file("glTF\2\0\0\0"), HasSubstr("glTF"));
-  EXPECT_THAT(kind_of_file("PK\3\4"), HasSubstr("ZIP"));
-  EXPECT_EQ(kind_of_file("{}"), "");
-  EXPECT_EQ(kind_of_file(""), "");
+  EXPECT_THAT(kind_of_file("a", "\x89HDF\r\n\x1a\n"), HasSubstr("HDF5"));
+  EXPECT_THAT(kind_of_file("a.json", "glTF\2\0\0\0"), HasSubstr("glTF"));
+  EXPECT_THAT(kind_of_file("a", "PK\3\4"), HasSubstr("ZIP"));
+  EXPECT_EQ(kind_of_file("a.h5", std::string(kPackMagic) + "..."), "a pack of a bundle");
+  EXPECT_EQ(kind_of_file("a", "solid x\nfacet"), "an STL surface");
+  EXPECT_EQ(kind_of_file("a.obj", "\n {\"bundle\""), kJson);
+  EXPECT_EQ(kind_of_file("a.json", "["), "");
+  EXPECT_EQ(kind_of_file("a", ""), "");
+}
+
+TEST(KindOfFile, IsToldByTheExtensionWhereBytesSayNothing) {
+  EXPECT_EQ(kind_of_file("A.OBJ", "# Blender\nv 0 0 0"), "an .obj surface");
+  EXPECT_EQ(kind_of_file("a.veg", "# by hand\n*VERTICES"), "a .veg mesh");
+  EXPECT_EQ(kind_of_file("a.node", "4 3 0 0"), "a TetGen mesh");
 }
 
 TEST(RefuseExtension, SaysTheWayToOneThatIsRead) {
@@ -62,7 +72,7 @@ TEST(RefuseExtension, SaysTheWayToOneThatIsRead) {
   };
   EXPECT_THAT(refusal("a.FBX"), AllOf(HasSubstr("'.fbx'"), HasSubstr("export it as .glb")));
   EXPECT_THAT(refusal("a.step"), HasSubstr("gmsh -3"));
-  EXPECT_THAT(refusal("a.npz"), HasSubstr("from Python"));
+  EXPECT_THAT(refusal("a.npz"), HasSubstr("from Python: exmat.precompute.write_mesh or exmat.precompute.bundle"));
   EXPECT_THAT(refusal("a"), HasSubstr("no extension"));
 }
 

@@ -343,7 +343,7 @@ TEST_F(ApiContactTest, WrongShapesAreRefusedInWords) {
   obstacle.shape = EXMAT_MESH;
   std::int64_t id = 0;
   EXPECT_EQ(exmat_world_add_obstacle(exmat_body_world(body.get()), &obstacle, &id), EXMAT_INVALID_ARGUMENT);
-  EXPECT_THAT(exmat_last_error(), HasSubstr("exmat_world_add_shape()"));
+  EXPECT_THAT(exmat_last_error(), HasSubstr("it is made of arrays: expected the shape"));
   obstacle.friction = -1;
   EXPECT_EQ(exmat_world_add_shape(exmat_body_world(body.get()), table_mesh().get(), &obstacle, &id),
             EXMAT_INVALID_ARGUMENT);

@@ -281,8 +281,8 @@ TEST_F(BadSnapshots, AreRefusedInWordsAndTheWorldIsAsItWas) {
   EXPECT_THAT(exmat_last_error(), HasSubstr("aligned to 8 bytes"));
   EXPECT_EQ(exmat_world_restore(world.get(), odd, bytes), EXMAT_INVALID_ARGUMENT);
 
-  refuses(good, 8, "expected a snapshot of exmat_world_save()");
-  refuses(Snapshot(good.size(), 7), bytes, "expected a snapshot of exmat_world_save()");
+  refuses(good, 8, "expected a snapshot, as the world saves it");
+  refuses(Snapshot(good.size(), 7), bytes, "expected a snapshot, as the world saves it");
   refuses(good, bytes - 1, "it ends early");
   for (std::size_t word = 0; word < good.size(); word += 1 + good.size() / 200)
     for (const int bit : {0, 30, 63}) {

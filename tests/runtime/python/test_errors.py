@@ -3,6 +3,7 @@ import fcntl
 import gc
 import os
 import pickle
+import re
 import resource
 import signal
 import subprocess
@@ -51,6 +52,23 @@ def test_messages_are_the_librarys(model, body, tmp_path):
         body.region_weights("leg")
 
 
+def test_no_message_names_a_function_of_c(bundle, model, body):
+    plain, everywhere = exmat.Body(exmat.Model(bundle)), exmat.Points.all_vertices(model)
+    of_space = exmat.Body(exmat.Model(bundle, space="auto"))
+    for call, said in ((lambda: exmat.World().restore(b"x"), "buffer: expected a snapshot, as the world saves it"),
+                       (lambda: body.apply_forces(everywhere, np.zeros((340, 3))), "make points of vertices by their ids, which can be pushed"),
+                       (lambda: body.apply_impulses(everywhere, np.zeros((340, 3))), "make points of vertices by their ids, which can be pushed"),
+                       (lambda: plain.target(), "the model has no example force: set use_examples"),
+                       (lambda: plain.set_example_stiffness(3), "the model has no example force: set use_examples"),
+                       (lambda: body.step(-1), "steps = -1"), (lambda: exmat.Batch(model, 0), "count"), (lambda: exmat.Points(model, [340]), "ids"),
+                       (lambda: setattr(body, "space", "full"), "created for steps in the modes alone"), (lambda: of_space.set_gravity((1e31, 0, 0)), "1e+31"),
+                       (lambda: body.set_reduced(np.zeros(3), np.zeros(3)), "expected"), (lambda: exmat.World().move_obstacle(7, exmat.Motion()), "7")):
+        with pytest.raises(exmat.Error) as refused:
+            call()
+        assert said in str(refused.value)
+        assert not re.search("exmat_|EXMAT_", str(refused.value)), refused.value
+
+
 def test_a_body_of_no_finite_numbers_is_as_it_was(bundle):
     body = exmat.Body(exmat.Model(bundle, time_step=0.001, stiffness_damping=1e300))
     body.set_reduced(np.full(12, 1e30), np.full(12, 1e30))
@@ -58,6 +76,11 @@ def test_a_body_of_no_finite_numbers_is_as_it_was(bundle):
     with pytest.raises(exmat.NonFinite, match="NaN or infinity"):
         body.step()
     assert np.array_equal(body.q, before) and body.report.steps == 0
+    held = exmat.Body(body.model)
+    held.set_reduced(before, before)
+    held.attach([held.model.vertices - 1], np.eye(3, 4), kind="spring", stiffness=1.0)
+    with pytest.raises(exmat.NonFinite, match="softer attachments"):
+        held.step()
     batch = exmat.Batch(body.model, 3)
     batch.set_reduced(*2 * [[[0] * 12, [1e30] * 12, [0] * 12]])
     with pytest.raises(exmat.NonFinite, match="body 1"):
@@ -305,9 +328,10 @@ def test_flags_are_true_or_false(model):
 
 def test_a_pose_of_other_vertices_is_named():
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
-    asset = {"name": "tet", "object": {"mesh": (corners, [[0, 1, 2, 3]])}, "examples": [{"name": "bend", "mesh": corners[:3]}]}
-    with pytest.raises(exmat.InvalidArgument, match=r"^examples\[0\].mesh: tets\[0, 3\] = 3: expected a vertex, 0 to 2"):
-        exmat.precompute.check(asset)
+    for pose, found in ((corners[:3], 3), (np.vstack([corners, [[9, 9, 9]]]), 5)):
+        asset = {"name": "tet", "object": {"mesh": (corners, [[0, 1, 2, 3]])}, "examples": [{"name": "bend", "mesh": pose}]}
+        with pytest.raises(exmat.InvalidArgument, match=rf"^examples\[0\].mesh: expected 4 vertices, as the mesh has that it is a pose of, found {found}$"):
+            exmat.precompute.check(asset)
 
 
 def test_members_that_hold_themselves_are_refused(tmp_path):

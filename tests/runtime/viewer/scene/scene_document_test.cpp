@@ -1,8 +1,10 @@
 #include "runtime/viewer/scene/scene_document.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "common/config/config.h"
+#include "common/config/json_file.h"
 #include "tests/support/temporary_folder.h"
 
 namespace exmat::viewer {
@@ -94,6 +96,24 @@ TEST_F(Documents, OfSeveralBodiesAreSavedAsScenesOfTheRunTime) {
   EXPECT_EQ(saved.bodies[1].scene.gravity, Eigen::Vector3d(0, 0, -3));
   EXPECT_EQ(saved.bodies[1].scene.examples->stiffness, 6);
   EXPECT_EQ(saved.bodies[0].scene.stiffness_damping, 0.5);
+}
+
+TEST_F(Documents, NameTheirFilesAndSaveThemAsSeenFromElsewhere) {
+  const SceneDocument scene = SceneDocument::open(folder_.write("files.json", R"({
+    "bodies": [{"name": "a", "bundle": "sub/a.h5", "poses": "sub/a.txt",
+                "forces": [{"vertices": {"file": "ids.txt"}, "force": [1, 0, 0]}]}],
+    "attachments": [{"body": "a", "vertices": {"file": "sub/held.txt"}}],
+    "obstacles": [{"mesh": {"file": "rock.ply"}}, {"plane": {"normal": [0, 0, 1]}}]})"));
+  std::vector<std::filesystem::path> expected;
+  for (const char* name : {"sub/a.h5", "sub/a.txt", "ids.txt", "sub/held.txt", "rock.ply"})
+    expected.push_back(folder_ / name);
+  EXPECT_THAT(scene.files(), ::testing::UnorderedElementsAreArray(expected));
+  std::filesystem::create_directories(folder_ / "other");
+  scene.save(folder_ / "other/files.json", 7, {});
+  const Json saved = read_json(folder_ / "other/files.json");
+  EXPECT_EQ(saved["bodies"][0]["bundle"], "../sub/a.h5");
+  EXPECT_EQ(saved["bodies"][0]["forces"][0]["vertices"]["file"], "../ids.txt");
+  EXPECT_EQ(saved["attachments"][0]["vertices"]["file"], "../sub/held.txt");
 }
 
 TEST(Settings, ThatNeedAnotherModelAreKnown) {
