@@ -1,5 +1,6 @@
 #include "precompute/modes/basis.h"
 
+#include <array>
 #include <gtest/gtest.h>
 #include <optional>
 #include <random>
@@ -33,7 +34,9 @@ Eigen::VectorXd internal_force(const TetMesh& mesh, const TetMaterials& material
 
 class Basis : public testing::TestWithParam<bool> {
  protected:
-  Basis() {
+  Basis() { make({6, 2, 2}, 6); }
+  void make(const std::array<int, 3>& cells, int modes) {
+    mesh_ = test::box_mesh(cells, {1.0, 0.3, 0.25});
     materials_ = {Eigen::VectorXd::LinSpaced(mesh_.tet_count(), 800, 1200),
                   Eigen::VectorXd::Constant(mesh_.tet_count(), 1e5),
                   Eigen::VectorXd::Constant(mesh_.tet_count(), 0.35)};
@@ -41,7 +44,7 @@ class Basis : public testing::TestWithParam<bool> {
     for (Eigen::Index v = 0; clamped() && v < fixed.size(); ++v) fixed[v] = mesh_.vertices(v, 0) < 1e-9 ? 1 : 0;
     system_ = build_elastic_system(mesh_, materials_, fixed);
     solver_.emplace(system_.stiffness, system_.mass * system_.null_space, "test");
-    modes_ = linear_modes(system_, *solver_, 6);
+    modes_ = linear_modes(system_, *solver_, modes);
     derivatives_ = modal_derivatives(mesh_, materials_, system_, *solver_, modes_.modes);
   }
   static bool clamped() { return GetParam(); }
@@ -49,7 +52,7 @@ class Basis : public testing::TestWithParam<bool> {
     return modal_basis({system_, modes_, derivatives_, bounding_box_diagonal(mesh_.vertices), fields}, size);
   }
 
-  TetMesh mesh_ = test::box_mesh({6, 2, 2}, {1.0, 0.3, 0.25});
+  TetMesh mesh_;
   TetMaterials materials_;
   ElasticSystem system_;
   std::optional<SemidefiniteSolver> solver_;
@@ -116,15 +119,7 @@ TEST_P(Basis, IsMassOrthonormalAndFreeOfRigidMotion) {
 
 // Derivatives of modes hold rigid motions, too, which are no deformations.
 TEST_P(Basis, HasAtMostAsManyColumnsAsThereAreDeformations) {
-  mesh_ = test::box_mesh({1, 1, 1}, {1.0, 0.3, 0.25});
-  materials_ = {Eigen::VectorXd::Constant(mesh_.tet_count(), 1000), Eigen::VectorXd::Constant(mesh_.tet_count(), 1e5),
-                Eigen::VectorXd::Constant(mesh_.tet_count(), 0.35)};
-  FlagVector fixed = FlagVector::Zero(mesh_.vertex_count());
-  for (Eigen::Index v = 0; clamped() && v < fixed.size(); ++v) fixed[v] = mesh_.vertices(v, 0) < 1e-9 ? 1 : 0;
-  system_ = build_elastic_system(mesh_, materials_, fixed);
-  solver_.emplace(system_.stiffness, system_.mass * system_.null_space, "test");
-  modes_ = linear_modes(system_, *solver_, 9);
-  derivatives_ = modal_derivatives(mesh_, materials_, system_, *solver_, modes_.modes);
+  make({1, 1, 1}, 9);
   const int most = clamped() ? 12 : 18;
   EXPECT_EQ(basis(most).cols(), most);
   EXPECT_THROW(basis(most + 1), InputError);
