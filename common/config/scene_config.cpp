@@ -335,15 +335,20 @@ void require_files(const SceneConfig& scene) {
   require_obstacle_files(scene);
 }
 
-void require_obstacle_files(const SceneConfig& scene) {
+std::vector<ObstacleFile> obstacle_files(const SceneConfig& scene) {
+  std::vector<ObstacleFile> files;
   for (std::size_t i = 0; i < scene.obstacles.size(); ++i) {
     const auto& shape = scene.obstacles[i].shape;
     if (const auto* mesh = std::get_if<MeshConfig>(&shape))
-      require_file(mesh->file, scene.file, fmt::format("/obstacles/{}/mesh/file", i), "a surface");
+      files.push_back({mesh->file, fmt::format("/obstacles/{}/mesh/file", i), "a surface"});
     if (const auto* heights = std::get_if<HeightFieldConfig>(&shape); heights && heights->file)
-      require_file(*heights->file, scene.file, fmt::format("/obstacles/{}/height_field/file", i),
-                   "a text file of heights");
+      files.push_back({*heights->file, fmt::format("/obstacles/{}/height_field/file", i), "a text file of heights"});
   }
+  return files;
+}
+
+void require_obstacle_files(const SceneConfig& scene) {
+  for (const auto& [file, place, kind] : obstacle_files(scene)) require_file(file, scene.file, place, kind);
 }
 
 std::vector<VertexForceConfig> forces_on_vertices(const SceneConfig& config, SelectablePoints points) {

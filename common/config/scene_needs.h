@@ -17,7 +17,15 @@ void set_trajectory(const std::optional<std::filesystem::path>& file, WorldConfi
 /// Throws InputError that names the scene's member where the bundle is not there, or a file of an obstacle.
 void require_files(const SceneConfig& scene);
 
-/// The same of the obstacles alone.
+/// A file that obstacles are made of, the place in the scene that names it, and what it is.
+struct ObstacleFile {
+  std::filesystem::path file;
+  std::string place;
+  const char* kind;
+};
+std::vector<ObstacleFile> obstacle_files(const SceneConfig& scene);
+
+/// require_files() of the obstacles alone.
 void require_obstacle_files(const SceneConfig& scene);
 
 /// Throws InputError where an example force, a `member` of the scene, is given weights, but not one for each of its

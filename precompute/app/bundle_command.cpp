@@ -145,11 +145,7 @@ void claim_outputs(const BundleOptions& options, const AssetConfig& asset, const
   if (!options.alignment_report.empty()) precompute::claim_alignment_report(asset, options.alignment_report);
   if (!scene) return;
   require_obstacle_files(*scene);
-  for (const ObstacleConfig& obstacle : scene->obstacles) {
-    if (const auto* mesh = std::get_if<MeshConfig>(&obstacle.shape)) check_input(mesh->file, "a surface");
-    if (const auto* heights = std::get_if<HeightFieldConfig>(&obstacle.shape); heights && heights->file)
-      check_input(*heights->file, "a text file of heights");
-  }
+  for (const ObstacleFile& named : obstacle_files(*scene)) check_input(named.file, named.kind);
 }
 
 /// Sets `model` where it makes one.

@@ -102,6 +102,10 @@ class Run {
   double kinetic() const;
   double rotation_energy() const;
   Eigen::Vector3d angular_momentum() const;
+  // Place of a vertex of a body that steps in all vertices.
+  Eigen::Vector3d place_in_full(Eigen::Index vertex, const runtime::Placement& frame) const {
+    return full_->rest.row(vertex).transpose() + runtime::full_displacement(*full_, frame, *state_.full, vertex);
+  }
   RowMatrix end_rows() const;
   Eigen::VectorXd force_on_end(const Eigen::Vector3d& force) const;
   double surface_density() const {  // mass over the area that it lies on [kg/m^2]
@@ -312,8 +316,9 @@ void Run::make_start() {
     result_.start_inverted += F.determinant() <= 0 ? 1.0 / static_cast<double>(cubature.weights.size()) : 0;
   }
   start_displacement_ = largest(q);
-  record_.start_energy = energies().total();
-  record_.start_potential = energies().potential;
+  const runtime::Energies energies = this->energies();
+  record_.start_energy = energies.total();
+  record_.start_potential = energies.potential;
   record_.kinetic = record_.peak_kinetic = kinetic();
 }
 
@@ -345,39 +350,32 @@ void Run::go_on_after_rest(bool was_at_rest) {
 double Run::kinetic() const {
   if (test_.ground != Ground::kNone) return energies().kinetic;
   if (!state_.full) return 0.5 * state_.v.squaredNorm();
-  // What the vertices do beside the turn and the shift of the body's frame.
+  // The vertices turn and shift with the body's frame, and deform by what is left.
   const runtime::Placement frame = model_.frame->placement(state_.frame);
   const runtime::FrameVelocity velocity = model_.frame->velocity(state_.frame);
-  const VertexArray& X = body_.reduced.object->mesh.vertices;
   Eigen::VectorXd own = state_.full->v;
-  for (Eigen::Index v = 0; v < X.rows(); ++v) {
-    const std::int32_t number = full_->space.number(v);
-    if (number < 0) continue;
-    const Eigen::Vector3d there = X.row(v).transpose() + runtime::full_displacement(*full_, frame, *state_.full, v);
-    own.segment<3>(3 * number) -= velocity.linear + velocity.angular.cross(there - frame.position);
-  }
+  for (Eigen::Index v = 0; v < full_->rest.rows(); ++v)
+    if (const std::int32_t number = full_->space.number(v); number >= 0)
+      own.segment<3>(3 * number) -= velocity.at(place_in_full(v, frame) - frame.position);
   // Velocities are known to rounding: the kinetic energy to that and its product with the largest of them.
   constexpr double kVelocityRounding = 1e-12;
   return std::max(0.0, 0.5 * own.dot(full_->space.momentum(own)) - kVelocityRounding * energies().kinetic);
 }
 
-// What the loads of the scene do work on.
+// Coordinates that the loads of the scene do work on.
 Eigen::VectorXd Run::coordinates() const {
   if (state_.full) return state_.full->q;
   return full_ != nullptr ? full_->basis * state_.q : state_.q;
 }
 
-// Of a free body about its centre of mass, from its motion.
+// Angular momentum of a free body about its centre of mass, from its motion.
 Eigen::Vector3d Run::angular_momentum() const {
   if (!state_.full) return precompute::angular_momentum(runtime::DeformingInertia(*body_.reduced.rigid), state_);
   const runtime::Placement frame = model_.frame->placement(state_.frame);
   const Eigen::VectorXd momenta = full_->space.momentum(state_.full->v);
-  const VertexArray& X = body_.reduced.object->mesh.vertices;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (Eigen::Index v = 0; v < X.rows(); ++v) {
-    const Eigen::Vector3d there = X.row(v).transpose() + runtime::full_displacement(*full_, frame, *state_.full, v);
-    sum += (there - frame.position).cross(momenta.segment<3>(3 * full_->space.number(v)));
-  }
+  for (Eigen::Index v = 0; v < full_->rest.rows(); ++v)
+    sum += (place_in_full(v, frame) - frame.position).cross(momenta.segment<3>(3 * full_->space.number(v)));
   return sum;
 }
 
@@ -385,20 +383,17 @@ Eigen::Vector3d Run::angular_momentum() const {
 double Run::displacement() const {
   if (!state_.full) return largest(state_.q);
   const runtime::Placement frame = model_.frame->placement(state_.frame);
-  const VertexArray& X = body_.reduced.object->mesh.vertices;
   double most = 0;
-  for (Eigen::Index v = 0; v < X.rows(); ++v) {
-    const Eigen::Vector3d rest = X.row(v).transpose();
-    const Eigen::Vector3d there = rest + runtime::full_displacement(*full_, frame, *state_.full, v);
-    most = std::max(most, (there - frame.to_world(rest)).norm());
-  }
+  for (Eigen::Index v = 0; v < full_->rest.rows(); ++v)
+    most = std::max(most, (place_in_full(v, frame) - frame.to_world(full_->rest.row(v))).norm());
   return most;
 }
 
 /// Displacement by the start and the loads in linear elasticity: a body of the energy W deflects to |q|_K = sqrt(2 W),
 /// a load that sets in at once to 2 |f|_(K^-1), and |u| <= reach |q|_K.
 double Run::linear_displacement() const {
-  double energy = energies().elastic + energies().kinetic;
+  const runtime::Energies energies = this->energies();
+  double energy = energies.elastic + energies.kinetic;
   double norm = 2 * body_.load_norm(scene_.gravity_force);
   if (test_.body.free && test_.ground == Ground::kNone)
     energy -= 0.5 * runtime::free_state(state_).linear_momentum.squaredNorm() / runtime::free_state(state_).mass;
@@ -460,7 +455,8 @@ double Run::rotation_energy() const {
 void Run::step_all() {
   Stepper stepper(model_, full_, scene_, policy_, state_);
   record_.displacement = start_displacement_ / body_.size;
-  record_.exchanged = energies().kinetic + energies().elastic;
+  const runtime::Energies energies = this->energies();
+  record_.exchanged = energies.kinetic + energies.elastic;
   Eigen::VectorXd before;
   const Timer timer;
   while (record_.steps < steps_) {

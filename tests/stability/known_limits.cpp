@@ -119,9 +119,8 @@ const std::vector<KnownLimit>& known_limits() {
                 test.tip_load.norm() > 0;
        },
        0.5, "corotational, space auto, loads that turn elements inside out",
-       "the modes do not hold the folds that all vertices have when the load ends: the energy of the nearest pose in "
-       "them "
-       "is another",
+       "the modes do not hold the folds that all vertices have when the load ends: their nearest pose has another "
+       "energy",
        "none; space full"},
       {"corotational-kink", Check::kSolved,
        [](const StabilityCase& test, const StudyBody&) {

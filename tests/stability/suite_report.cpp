@@ -16,14 +16,15 @@
 namespace exmat::precompute {
 namespace {
 
+using Row = std::vector<std::string>;
+using Json = nlohmann::ordered_json;
+
+/// The row that all runs of the kind of this one are added up in.
 const char* total_of(const StabilityCase& test) {
   if (test.precision == Precision::kMixed) return "all, mixed";
   if (test.space == Space::kReduced) return "all";
   return test.space == Space::kFull ? "all, full" : "all, auto";
 }
-
-using Row = std::vector<std::string>;
-using Json = nlohmann::ordered_json;
 
 // Sums over the runs of one group and integrator.
 struct Sum {

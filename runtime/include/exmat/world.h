@@ -138,8 +138,8 @@ EXMAT_API int64_t exmat_world_contacts(const exmat_world* world) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_world_read_contacts(const exmat_world* world, exmat_body_contact* contacts, int64_t count,
                                                  size_t size) EXMAT_NOEXCEPT;
 
-/* What touched before the last call that stepped the world, or after it. A body that fell asleep goes on touching; what
-   was put elsewhere, added or taken out since the call before has no touch that ends. */
+/* Two that touched before the last call that stepped the world, or after it. A body that fell asleep goes on touching;
+   one that was put elsewhere, added or taken out since the call before has no touch that ends. */
 enum { EXMAT_TOUCH_BEGINS = 0, EXMAT_TOUCH_STAYS = 1, EXMAT_TOUCH_ENDS = 2 };
 typedef struct exmat_touch {
   int64_t body;     /* ids */
