@@ -171,6 +171,7 @@ void FullSpaceStep::commit() {
   state_.time = static_cast<double>(state_.step) * scene_.time_step;
   state_.begins_anew = terms_.contacts != nullptr;
   state_.contacts.count = 0;
+  state_.contacts.first_step = false;
   if (terms_.contacts != nullptr) {
     model_.contacts->commit(state_.q, contacts_, state_.contacts);
     report_.contacts = contacts_.touching;

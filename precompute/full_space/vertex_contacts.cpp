@@ -40,8 +40,10 @@ VertexContacts::Step VertexContacts::begin(const runtime::Obstacles& obstacles, 
       candidate.vertex = vertex;
       candidate.obstacle = static_cast<int>(i);
       const Eigen::Vector3d way = time_step * v.segment<3>(dofs_[static_cast<std::size_t>(vertex)]);
-      runtime::freeze_contact(step.obstacles[i], runtime::find_held(held, next, candidate),
-                              {here, here + way, here + 2 * way}, areas_[vertex], time_step, candidate);
+      runtime::freeze_contact(
+          step.obstacles[i], runtime::find_held(held, next, candidate),
+          {.point = here, .predicted = here + way, .heading = here + 2 * way, .first_step = held.first_step},
+          areas_[vertex], time_step, candidate);
     }
   return step;
 }

@@ -14,7 +14,7 @@
 namespace exmat::runtime {
 namespace {
 
-constexpr double kLayout = 4;
+constexpr double kLayout = 5;
 
 constexpr Eigen::VectorXd State::*kModeArrays[] = {&State::q, &State::v, &State::q_previous, &State::v_previous,
                                                    &State::a};
@@ -60,7 +60,7 @@ void visit_frame(StateReader& archive, exmat_body& body) {
   if (!archive.checks()) body.model().frame->set_numbers(numbers, body.state.frame);
 }
 
-/// All that a body carries from step to step, after six numbers that say of what.
+/// All that a body carries from step to step, after seven numbers that say of what.
 template <typename Archive, typename Body>
 void visit(Archive& archive, Body& body) {
   auto& state = body.state;
@@ -68,6 +68,7 @@ void visit(Archive& archive, Body& body) {
   archive.same("time step", body.scene.time_step, " s", ", the model's");
   archive.whole("steps", state.step, kMostSteps);
   archive.flag("begins_anew", state.begins_anew);
+  archive.flag("first step", state.contacts.first_step);
   const std::size_t contacts =
       archive.whole("contacts", state.contacts.count, static_cast<double>(state.contacts.held.size() + 1));
   const bool in_full_space = visit_space(archive, body);
@@ -160,8 +161,11 @@ exmat_status exmat_body_set_state(exmat_body* body, const double* numbers, std::
     const double time = body->state.time;
     StateReader reader(given, StateReader::Use::kTake);
     visit_state(reader, *body);
-    body->state.begins_anew |= holds_modes(body->state.attachments);  // whose past it does not hold
+    State& state = body->state;
+    state.begins_anew |= holds_modes(state.attachments);                             // whose past it does not hold
+    const bool anew = state.contacts.first_step || body->world->members.size() > 1;  // others' contacts are forgotten
     was_put(*body);
+    state.contacts.first_step = anew;
     follow_time(*body, time);
   });
 }

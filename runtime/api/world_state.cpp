@@ -23,16 +23,6 @@ namespace {
 
 // ---- what both hold
 
-bool visit_anew(StateWriter& archive, const exmat_world& world, int body) {
-  return archive.flag("anew", world.world.is_anew(body));
-}
-
-void visit_anew(StateReader& archive, exmat_world& world, int body) {
-  bool anew = false;
-  anew = archive.flag("anew", anew);
-  if (!archive.checks()) world.world.set_anew(body, anew);
-}
-
 /// A bound that may be infinite, which no number of a state is.
 void visit_bound(StateWriter& archive, double bound) { archive.load(std::isfinite(bound) ? bound : -1); }
 
@@ -94,15 +84,12 @@ void visit_pairs(Archive& archive, World& world, Pairs& pairs) {
   }
 }
 
-/// Number of bodies; the state of each, and whether it is anew; number of pairs; of each its bodies, its energy and its
+/// Number of bodies; the state of each; number of pairs; of each its bodies, its energy and its
 /// account, the number of vertices of either that touch, and ten numbers for each of these.
 template <typename Archive, typename World>
 void visit_motion(Archive& archive, World& world) {
   archive.same("bodies", static_cast<double>(world.members.size()), "", ", those of the world");
-  for (std::size_t i = 0; i < world.members.size(); ++i) {
-    visit_anew(archive, world, static_cast<int>(i));
-    visit_body(archive, *world.members[i].body);
-  }
+  for (std::size_t i = 0; i < world.members.size(); ++i) visit_body(archive, *world.members[i].body);
   visit_pairs(archive, world, world.world.held());
 }
 

@@ -79,7 +79,6 @@ std::vector<WorldBodyStart> Bodies::starts() const {
 void Bodies::restart() {
   BodiesMemory memory;
   for (WorldBodyStart& start : starts()) memory.states.push_back(std::move(start.state));
-  memory.anew.assign(memory.states.size(), true);
   take_up(std::move(memory));
 }
 
@@ -99,19 +98,14 @@ WorldReport Bodies::step(StepObserver* observer) {
 }
 
 void Bodies::remember(BodiesMemory& memory) const {
-  const auto bodies = static_cast<std::size_t>(count());
-  memory.states.resize(bodies);
-  memory.anew.resize(bodies);
-  for (std::size_t i = 0; i < bodies; ++i) {
-    memory.states[i] = world_.state(static_cast<int>(i));
-    memory.anew[i] = world_.is_anew(static_cast<int>(i));
-  }
+  memory.states.resize(static_cast<std::size_t>(count()));
+  for (int i = 0; i < count(); ++i) memory.states[static_cast<std::size_t>(i)] = world_.state(i);
   memory.held = world_.held();
 }
 
 void Bodies::take_up(BodiesMemory memory) {
   for (int i = 0; i < count(); ++i) world_.state(i) = std::move(memory.states[static_cast<std::size_t>(i)]);
-  world_.set_memory(std::move(memory.held), memory.anew);
+  world_.set_memory(std::move(memory.held));
 }
 
 std::optional<double> Bodies::farthest_reach() const {

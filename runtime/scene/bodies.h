@@ -15,7 +15,6 @@ namespace exmat::runtime {
 struct BodiesMemory {
   std::vector<State> states;
   std::vector<HeldPair> held;
-  std::vector<bool> anew;  ///< World::is_anew()
 };
 
 /// The bodies of a loaded scene as they are stepped.

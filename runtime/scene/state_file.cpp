@@ -78,7 +78,6 @@ class Reader {
     if (state.step != memory.states.front().step)
       refuse(place + "/step", fmt::format("{}, as of the first body", memory.states.front().step),
              fmt::format("{}", state.step));
-    memory.anew.push_back(from.value("anew", false));
   }
 
   void read_pair(std::size_t index, BodiesMemory& memory) const {
@@ -157,8 +156,7 @@ void write_state(const BodiesMemory& memory, const LoadedWorld& loaded, const Wo
     OrderedJson body = OrderedJson::object();
     if (config.is_list)
       body = {{"name", loaded.bodies[i].name},
-              {"bundle_input_sha256", kind.summary.input_sha256},
-              {"anew", static_cast<bool>(memory.anew[i])}};
+              {"bundle_input_sha256", kind.summary.input_sha256}};
     body.update(state_to_json(memory.states[i], *kind.model->frame));
     document["bodies"].push_back(std::move(body));
   }

@@ -72,6 +72,7 @@ class BodyReader {
     state.time = static_cast<double>(state.step) * loaded_.scene.time_step;
     state.elastic_energy = body_["elastic_energy"];
     state.begins_anew = body_["begins_anew"];
+    state.contacts.first_step = body_.value("anew", false);
     if (body_.contains("sleep"))
       state.sleep = {body_["sleep"]["asleep"], body_["sleep"]["still_steps"], body_["sleep"]["loads"]};
     const BodyFrame& frame = *loaded_.model->frame;
@@ -174,6 +175,7 @@ OrderedJson state_to_json(const State& state, const BodyFrame& frame) {
   OrderedJson body{{"step", state.step},
                    {"elastic_energy", state.elastic_energy},
                    {"begins_anew", state.begins_anew},
+                   {"anew", state.contacts.first_step},
                    {"frame", frame.numbers(state.frame)},
                    {"examples", OrderedJson::array()},
                    {"contacts", OrderedJson::array()}};

@@ -88,24 +88,27 @@ std::optional<SurfaceHit> nearest_by_side(const BodySurface& surface, const Eige
 /// The candidates of one body's vertices and the surface of another, or of its own, vertex by vertex in ascending
 /// order.
 struct Gathering {
-  Gathering(const ContactLaw& its_law, const TouchingBody& its_a, const TouchingBody& its_b, double its_time_step,
-            double its_margin, bool is_anew, bool is_own, const std::vector<HeldBodyContact>& its_held,
-            SurfaceShape& its_shape, BodyCandidates& its_candidates)
+  Gathering(const ContactLaw& its_law, const TouchingBody& its_a, const TouchingBody& its_b,
+            const CandidateSearch& search, double its_margin, bool is_own, BodyCandidates& its_candidates)
       : law(its_law),
         a(its_a),
         b(its_b),
-        time_step(its_time_step),
+        time_step(search.time_step),
         margin(its_margin),
-        anew(is_anew),
+        pressed(law.most_pressed(std::min(a.set.load(), b.set.load()), search.gravity)),
+        anew(search.anew && !is_own),
         own(is_own),
-        held(its_held),
-        shape(its_shape),
+        held(search.held),
+        shape(search.shape),
         candidates(its_candidates),
         last(held.begin()) {
     candidates.all.clear();
     surface_radius = b.touching.surface.bound(b.pose.q).radius;
     deepest = anew ? 2 * surface_radius : 0;
-    for (const HeldBodyContact& contact : held) deepest = std::max(deepest, -contact.gap);
+    for (const HeldBodyContact& contact : held) {
+      deepest = std::max(deepest, -contact.gap);
+      overlaps = overlaps || contact.overlap > 0;
+    }
   }
 
   /// A vertex, with its place from the other body's, world, and in the frame of that body [m].
@@ -208,11 +211,20 @@ struct Gathering {
     const Eigen::Vector3d place = at.offset - arm_b;
     freeze_contact(law, surface, place, place + time_step * apart, a.set.area(vertex), time_step, candidate);
     const double depth = -surface.distance;
-    const double inside = was_inside ? before->overlap : anew ? depth : 0;
-    candidate.release_overlap(depth, inside, time_step * law.release);
+    const double inside = was_inside ? kept_overlap(*before, depth)
+                          : anew     ? depth
+                          : overlaps ? std::max(0.0, depth - way)
+                                     : 0;
+    candidate.release_overlap(depth, inside, time_step * surface.normal.dot(apart), pressed, time_step * law.release);
     if (!was_inside) return;
-    candidate.friction_force = law.friction * before->normal_force;
+    if (candidate.rubs()) candidate.friction_force = law.friction * before->normal_force;
     take_stretch(*before, b.pose.rotation, candidate);
+  }
+
+  /// Overlap of a vertex that now is `depth` inside [m]: no motion lies between, so that what is more than it was is
+  /// that of another part of the surface.
+  static double kept_overlap(const HeldBodyContact& before, double depth) {
+    return before.overlap > 0 ? before.overlap + std::max(0.0, depth + before.gap) : 0;
   }
 
   /// By a way of so much in a step [m].
@@ -221,12 +233,14 @@ struct Gathering {
   const ContactLaw& law;
   const TouchingBody &a, &b;
   double time_step, margin;
+  double pressed;  ///< depth by which springs may be pressed by what is released [m]
   bool anew, own;
   std::optional<Eigen::Vector3d> way_out;  ///< in the frame of b
   const std::vector<HeldBodyContact>& held;
   SurfaceShape& shape;
   BodyCandidates& candidates;
   std::vector<HeldBodyContact>::const_iterator last;
+  bool overlaps = false;      ///< some vertices have not left what they overlapped at the start
   bool is_fast = false;       ///< true for a body with itself: looks at what is nearer than `near` and by ClosingPoint
   double near = 0;            ///< [m]
   double deepest = 0;         ///< that a vertex may be inside [m]
@@ -327,10 +341,10 @@ std::optional<Eigen::Vector3d> way_out_of(const TouchingBody& a, const TouchingB
 
 void BodyContact::gather(const TouchingBody& a, const TouchingBody& b, const CandidateSearch& search,
                          BodyCandidates& candidates) const {
-  const double time_step = search.time_step, margin = search.margin;
+  const double margin = search.margin;
   SurfaceShape& shape = search.shape;
   NearVertices& near = search.near;
-  Gathering gathering{law_, a, b, time_step, margin, search.anew, /*own=*/false, search.held, shape, candidates};
+  Gathering gathering{law_, a, b, search, margin, /*own=*/false, candidates};
   if (search.way_out && gathering.share_inside() >= kDeepShare)
     gathering.way_out = b.pose.rotation.transpose() * *search.way_out;
   const auto test_all = [&](double radius) {
@@ -365,8 +379,7 @@ void BodyContact::gather_own(const TouchingBody& body, const CandidateSearch& se
     way = time_step * surface.fastest(shape);
   }
   const double farthest = margin + 2 * kContactMarginSteps * way;
-  Gathering gathering{law_,           body,         body,        time_step, farthest,
-                      /*anew=*/false, /*own=*/true, search.held, shape,     candidates};
+  Gathering gathering{law_, body, body, search, farthest, /*own=*/true, candidates};
   gathering.is_fast = is_fast;
   gathering.near = margin + way;
   const auto approach = [&](int vertex) { return touching.vertex_bounds.row(vertex).dot(body.pose.q.cwiseAbs()); };

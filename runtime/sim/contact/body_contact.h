@@ -132,6 +132,7 @@ struct CandidateSearch {
   SurfaceShape& shape;                       ///< that of b, placed
   NearVertices& near;                        ///< found by earlier searches; the candidates are the same without
   std::optional<Eigen::Vector3d> way_out{};  ///< way_out_of(a, b) where there is no last step
+  double gravity = 0;                        ///< [m/s^2]
 };
 
 /// The unit vector, world, along which `a` comes out of `b` soonest, axes of the bounding box of `a` taken; none where

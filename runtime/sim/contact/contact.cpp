@@ -87,6 +87,20 @@ void ContactWorkspace::refresh_friction(FrictionChange& change) noexcept {
   }
 }
 
+double ContactWorkspace::start_energy() const noexcept {
+  double sum = 0;
+  for (const ContactCandidate& candidate : std::span(candidates).first(candidate_count))
+    sum += start_energy_of(obstacles[static_cast<std::size_t>(candidate.obstacle)], candidate);
+  return sum;
+}
+
+double ContactWorkspace::end_energy(const Eigen::Vector3d& position) const noexcept {
+  double sum = 0;
+  for (const ContactCandidate& candidate : std::span(candidates).first(candidate_count))
+    sum += stored_energy(candidate, candidate.gap, position + candidate.arm);
+  return sum;
+}
+
 ContactSet::ContactSet(const ContactData& data, const Eigen::Vector3d& origin, double mass) {
   const auto count = static_cast<int>(data.areas.size());
   const VertexArray rest = data.positions.rowwise() - origin.transpose();
@@ -283,8 +297,9 @@ void ContactSet::freeze_batch(const BodyPose& pose, const BodyVelocity& velocity
     const Eigen::Vector3d at = velocity.at(arm) + pose.rotation * batch.products.col(index);
     const Eigen::Vector3d predicted = point + time_step * at;
     const Eigen::Vector3d heading = predicted + time_step * (at + expected.at(arm) - velocity.at(arm));
-    freeze_contact(placed, find_held(state, next, candidate), {point, predicted, heading, pose.position, load_},
-                   areas_[candidate.vertex], time_step, candidate);
+    freeze_contact(placed, find_held(state, next, candidate),
+                   {point, predicted, heading, pose.position, load_, state.first_step}, areas_[candidate.vertex],
+                   time_step, candidate);
     if (workspace.are_all_planes)
       workspace.planes.set(number, rest(candidate.vertex), placed.plane->distance(candidate.carried),
                            placed.obstacle->friction, candidate);

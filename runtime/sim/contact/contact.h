@@ -81,6 +81,11 @@ struct ContactWorkspace : ContactSums {
   /// Takes lambda of candidates one by one from the last evaluation.
   void refresh_friction(FrictionChange& change) noexcept;
 
+  /// Energy that the springs hold where the step begins, after freeze(), of obstacles that do not move [J].
+  double start_energy() const noexcept;
+  /// The same where it ends, after commit() at arms beyond `position`.
+  double end_energy(const Eigen::Vector3d& position) const noexcept;
+
   // Counts of the last gather().
   int visited_nodes = 0;
   int tested_vertices = 0;

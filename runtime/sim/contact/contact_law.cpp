@@ -9,16 +9,6 @@ namespace {
 /// True if nobody has seen a vertex so deep come in, whose velocity takes it so far in a step.
 bool was_put(double depth, double gone) { return depth > kEntrySteps * gone; }
 
-/// Depth by which springs may be pressed by what is released [m]: springs of a body that is held, or pushed to several
-/// sides, hold a quarter of the energy of its motion at the speed of release, and its weight on a quarter of its
-/// surface.
-double most_pressed(const Obstacle& obstacle, const VertexMotion& motion, double time_step) {
-  if (!std::isfinite(motion.load)) return motion.load;
-  const double gravity = (motion.heading - 2 * motion.predicted + motion.point).norm() / (time_step * time_step);
-  return 0.5 * obstacle.release * std::sqrt(motion.load / obstacle.stiffness) +
-         4 * motion.load * gravity / obstacle.stiffness;
-}
-
 // Divisions and roots take most of the time of a vertex: each is done once.
 
 /// Friction of size `limit` as a function of the slip l: f1(l) / l, its derivative f1' and its integral f0, all times
@@ -75,6 +65,12 @@ double evaluate_friction(ContactCandidate& candidate, const Eigen::Vector3d& poi
   return law.energy;
 }
 
+double gap_at(const PlacedObstacle& placed, const ContactCandidate& candidate, const Eigen::Vector3d& point) {
+  NearestHint hint = candidate.hint;
+  bool by_plane = false;
+  return felt_surface(placed, candidate.passage, point, hint, by_plane).distance;
+}
+
 bool precedes(const HeldContact& held, const ContactCandidate& candidate) {
   return held.vertex != candidate.vertex ? held.vertex < candidate.vertex : held.obstacle < candidate.obstacle;
 }
@@ -96,6 +92,11 @@ void freeze_contact(const ContactLaw& law, const SurfacePoint& surface, const Ei
   candidate.overlap = candidate.released = 0;
 }
 
+double ContactLaw::most_pressed(double load, double acceleration) const noexcept {
+  if (!std::isfinite(load)) return load;
+  return 0.5 * release * std::sqrt(load / stiffness) + 4 * load * acceleration / stiffness;
+}
+
 double ContactState::longest_way_out() const noexcept {
   double longest = 0;
   for (std::size_t i = 0; i < count; ++i) longest = std::max(longest, held[i].way_out.squaredNorm());
@@ -115,7 +116,7 @@ void freeze_contact(const PlacedObstacle& placed, const HeldContact* held, const
   const VertexWay way{placed.carried(motion.point), motion.predicted, motion.heading};
   candidate.hint = NearestHint();
   SurfacePoint surface = placed.nearest_surface_point(way.carried, candidate.hint);
-  const double gone = (motion.predicted - way.carried).norm();
+  const double gone = motion.first_step ? 0 : (motion.predicted - way.carried).norm();
   Eigen::Vector3d way_out = Eigen::Vector3d::Zero();
   if (held != nullptr)
     way_out = placed.pose.rotation * held->way_out;
@@ -127,19 +128,18 @@ void freeze_contact(const PlacedObstacle& placed, const HeldContact* held, const
     if (is_let_out) candidate.passage.side.normal = way_out.normalized();  // that of all its body
     surface = candidate.passage.side.nearest(way.carried);
   }
-  freeze_contact({obstacle.stiffness, obstacle.damping, obstacle.friction, obstacle.release}, surface, way.carried,
-                 motion.predicted, area, time_step, candidate);
+  const ContactLaw law{obstacle.stiffness, obstacle.damping, obstacle.friction, obstacle.release};
+  freeze_contact(law, surface, way.carried, motion.predicted, area, time_step, candidate);
   const double depth = -surface.distance;
   const double before = held != nullptr ? held->overlap : was_put(depth, gone) ? depth : 0;
   if (before > 0) {
-    const double pressed = depth - surface.normal.dot(motion.predicted - way.carried) - before;
-    candidate.release_overlap(
-        depth, before,
-        std::clamp(most_pressed(obstacle, motion, time_step) - pressed, 0.0, time_step * obstacle.release));
+    const double acceleration = (motion.heading - 2 * motion.predicted + motion.point).norm() / (time_step * time_step);
+    candidate.release_overlap(depth, before, surface.normal.dot(motion.predicted - way.carried),
+                              law.most_pressed(motion.load, acceleration), time_step * law.release);
   }
   if (held == nullptr) return;
   candidate.anchor = placed.pose.to_world(held->anchor);
-  candidate.friction_force = obstacle.friction * held->normal_force;
+  if (candidate.rubs()) candidate.friction_force = obstacle.friction * held->normal_force;
 }
 
 double evaluate_contact(double gap, const Eigen::Vector3d& normal, const Eigen::Vector3d& point,
@@ -188,9 +188,20 @@ double evaluate_contact(const PlacedObstacle& placed, const Eigen::Vector3d& poi
 
 double contact_potential(const PlacedObstacle& placed, const ContactCandidate& candidate,
                          const Eigen::Vector3d& point) noexcept {
-  NearestHint hint = candidate.hint;
-  bool by_plane = false;
-  return contact_potential(candidate, felt_surface(placed, candidate.passage, point, hint, by_plane).distance, point);
+  return contact_potential(candidate, gap_at(placed, candidate, point), point);
+}
+
+double start_energy_of(const PlacedObstacle& placed, const ContactCandidate& candidate) noexcept {
+  return stored_energy(candidate, gap_at(placed, candidate, candidate.carried), candidate.carried);
+}
+
+double stored_energy(const ContactCandidate& candidate, double gap, const Eigen::Vector3d& point) noexcept {
+  const double depth = std::max(0.0, -gap - candidate.overlap);
+  const double normal = 0.5 * candidate.stiffness * depth * depth;
+  if (candidate.friction_force <= 0) return normal;
+  const double longest = 2 * candidate.friction_force / candidate.stiffness;  // beyond it slides
+  const double stretch = tangential(point - candidate.anchor, candidate.normal).norm();
+  return normal + SlipLaw(candidate.friction_force, candidate.stiffness, std::min(stretch, longest)).energy;
 }
 
 double contact_potential(const ContactCandidate& candidate, double gap, const Eigen::Vector3d& point) noexcept {
@@ -202,7 +213,7 @@ double contact_potential(const ContactCandidate& candidate, double gap, const Ei
 }
 
 void FrictionChange::refresh(double friction, ContactCandidate& candidate) noexcept {
-  const double force = friction * candidate.normal_force;
+  const double force = candidate.rubs() ? friction * candidate.normal_force : 0;
   add(candidate.friction_force, force);
   candidate.friction_force = force;
 }
@@ -217,7 +228,7 @@ double refresh_friction(const std::vector<PlacedObstacle>& obstacles,
 
 Eigen::Vector3d held_stretch(double friction, const Eigen::Vector3d& point,
                              const ContactCandidate& candidate) noexcept {
-  const double full = 2 * friction * candidate.normal_force / candidate.stiffness;
+  const double full = candidate.rubs() ? 2 * friction * candidate.normal_force / candidate.stiffness : 0;
   const double length = candidate.slip.norm();
   return length > full ? Eigen::Vector3d(candidate.slip * (full / length))
                        : tangential(point - candidate.anchor, candidate.normal);

@@ -40,6 +40,11 @@ struct ContactLaw {
 
   /// The law of each of two surfaces whose vertices meet the other one.
   ContactLaw half() const noexcept { return {0.5 * stiffness, 0.5 * damping, friction, release}; }
+
+  /// Depth by which what is released may press springs [m], `load` [kg/m^2] in an `acceleration` [m/s^2]: springs of a
+  /// body that is held, or pushed to several sides, hold a quarter of the energy of its motion at the speed of release,
+  /// and its weight on a quarter of its surface. Infinite with a load that is not known.
+  double most_pressed(double load, double acceleration) const noexcept;
 };
 
 /// Memory of a touching vertex from step to step.
@@ -57,6 +62,7 @@ struct ContactState {
   std::vector<HeldContact> held;
   std::size_t count = 0;
   NearPlanes near_planes;  ///< saves searches; results are the same without
+  bool first_step = true;  ///< True until the first step after the body was placed by hand.
 
   /// Distance of the farthest of them from the surface that it came in by, where that is not the nearest [m].
   double longest_way_out() const noexcept;
@@ -75,7 +81,7 @@ struct ContactCandidate {
   double spring_share = 1;                            ///< 1 / (1 + gamma)
   double friction_force = 0;                          ///< mu lambda, lambda the lagged normal force [N]
   double overlap = 0;                                 ///< part of the depth that pushes nothing yet [m]
-  double released = 0;                                ///< overlap that is released where the step begins [m]
+  double released = 0;                                ///< energy that its spring has by what is released [J]
   Passage passage;                                    ///< set for obstacles
 
   /// Clearance: the way of its vertex from the first evaluation on which nothing touches it [m]; negative: it has to be
@@ -93,14 +99,19 @@ struct ContactCandidate {
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< direction of the normal force, where there is one
 
   /// Releases at most `most` [m] of the overlap of a vertex `depth` inside [m], of which `before` had no push so far
-  /// [m].
-  void release_overlap(double depth, double before, double most) noexcept {
+  /// [m], and by which its spring, at the end of a step that takes it `out` [m], is pressed no more than `pressed` [m].
+  void release_overlap(double depth, double before, double out, double pressed, double most) noexcept {
+    const double end = depth - out;
+    most = std::clamp(pressed - (end - before), 0.0, most);
     before = std::clamp(before, 0.0, std::max(0.0, depth));
     overlap = std::max(0.0, before - most);
-    released = before - overlap;
+    const double press = std::max(0.0, end - overlap), press_before = std::max(0.0, end - before);
+    released = 0.5 * stiffness * (press * press - press_before * press_before);
   }
   /// So is one whose numbers overflowed: its force tells.
   bool is_loaded() const noexcept { return !(normal_force <= 0) || friction_force > 0; }
+  /// No friction keeps bodies from leaving what they overlap.
+  bool rubs() const noexcept { return overlap <= 0; }
   /// Derivative of the normal force by the depth [N/m]; 0 where there is no force.
   double normal_stiffness() const noexcept { return normal_force > 0 ? stiffness * (1 + damping) : 0; }
 };
@@ -117,6 +128,7 @@ struct VertexMotion {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();     ///< of its body, where the step begins [m]
   /// Mass of its body over the area of the surface [kg/m^2]; infinite: not known.
   double load = std::numeric_limits<double>::infinity();
+  bool first_step = false;  ///< its body was placed by hand: what it overlaps was not seen coming
 };
 
 /// Sets what a step keeps of a candidate, whose vertex has the share `area` of the surface [m^2]; friction and anchor
@@ -160,6 +172,12 @@ double contact_potential(const ContactCandidate& candidate, double gap, const Ei
 /// The same of the vertex at `point` of an obstacle's candidate; leaves the last evaluation as it is.
 double contact_potential(const PlacedObstacle& placed, const ContactCandidate& candidate,
                          const Eigen::Vector3d& point) noexcept;
+
+/// Energy that the springs of a candidate hold at `point`, `gap` from the surface [J]: those that damp and the way that
+/// it slides apart.
+double stored_energy(const ContactCandidate& candidate, double gap, const Eigen::Vector3d& point) noexcept;
+/// The same where the step begins, of an obstacle that does not move.
+double start_energy_of(const PlacedObstacle& placed, const ContactCandidate& candidate) noexcept;
 
 /// Change of the friction forces when lambda is updated.
 struct FrictionChange {

@@ -123,6 +123,7 @@ void commit(const Model& model, const StepScene& scene, double elastic_energy, W
   state.a = form.acceleration_factor * (state.q - form.acceleration_centre);
   model.frame->commit(scene, form.velocity_factor, state.q, state.v, state.a, workspace.frame, state.frame);
   state.elastic_energy = elastic_energy;
+  state.contacts.first_step = false;
   ++state.step;
   state.time = static_cast<double>(state.step) * scene.time_step;
   commit_weights(scene, workspace, state);

@@ -48,7 +48,7 @@ bool move_body(const Model& model, const StepScene& scene, const FrameMotion& mo
   const Placement before = model.frame->placement(state.frame);
   if (!model.frame->set_motion(motion, state.q, state.v, workspace.frame, state.frame)) return false;
   carry_contacts(scene, before, model.frame->placement(state.frame), state);
-  state.begins_anew = true;
+  state.contacts.first_step = state.begins_anew = true;
   return true;
 }
 

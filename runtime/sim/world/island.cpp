@@ -20,7 +20,7 @@ constexpr double kShareOfLimit = 0.3, kLeastExact = 0.1;
 constexpr double kRoughTolerance = 0.03;
 constexpr int kMostGradients = 400;
 constexpr int kSureIterations = 8;  // of Newton's method: bodies at rest take fewer
-constexpr double kGain = 1e-12;     // of the kinetic energy: rounding
+constexpr double kGain = 1e-12;     // of energies: rounding
 // Likewise where bodies step in all vertices: each of their iterations costs as much as many of others.
 constexpr double kFullSolutionError = 0.03;
 
@@ -616,36 +616,60 @@ IslandStart start_accounts(std::span<WorldBody* const> bodies, std::span<PairCon
   return start;
 }
 
-/// True if nothing but gravity and what they do to each other changes the energy of the bodies.
-bool is_isolated(std::span<WorldBody* const> bodies, const IslandBegin& begin) noexcept {
-  return begin.is_alone && std::ranges::none_of(bodies, [](const WorldBody* own) {
-           const FreeState& free = free_state(own->state);
-           return runs_examples(own->scene()) || !own->scene().forces.empty() || !own->state.applied_force.isZero(0) ||
-                  !free.applied_force.isZero(0) || !free.applied_torque.isZero(0);
-         });
+/// True if nothing but gravity, what they do to each other and obstacles that stand still change the energy of the
+/// bodies.
+bool is_isolated(std::span<WorldBody* const> bodies) noexcept {
+  return std::ranges::none_of(bodies, [](const WorldBody* own) {
+    if (own->full ? own->full->is_driven() : own->model.frame->is_driven()) return true;
+    const ContactWorkspace& contact = own->near().contact;
+    const bool is_pushed =
+        contact.candidate_count > 0 &&
+        std::ranges::any_of(contact.obstacles, [](const auto& placed) { return placed.obstacle->motion.moves(); });
+    const auto* const free = std::get_if<FreeState>(&own->state.frame);
+    return is_pushed || holds_modes(own->state.attachments) || runs_examples(own->scene()) ||
+           !own->scene().forces.empty() || !own->state.applied_force.isZero(0) || !own->state.vertex_force.isZero(0) ||
+           (free != nullptr && !(free->applied_force.isZero(0) && free->applied_torque.isZero(0)));
+  });
+}
+
+/// Energy of the springs of obstacles where the step has led [J].
+double obstacle_energy(std::span<WorldBody* const> bodies) noexcept {
+  double sum = 0;
+  for (const WorldBody* const own : bodies) {
+    const Eigen::Vector3d position = own->model.frame->placement(own->state.frame).position;
+    sum += own->near().contact.end_energy(own->full ? Eigen::Vector3d(0, 0, 0) : position);
+  }
+  return sum;
 }
 
 /// After a step that did not converge, or that ends with more energy than there is: the bodies have the momenta that
 /// they have to have, if nothing else touches them, and together no more energy than `allowed` [J].
 void limit_energy(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs, const IslandBegin& begin,
-                  double allowed) noexcept {
+                  bool isolated, double allowed) noexcept {
   const IslandEnergy now = energy_of(bodies, pairs);
-  if (begin.is_alone) {
-    if (!take_momenta(bodies, begin, allowed - (now.total - now.kinetic))) return;
-    for (PairContact* const pair : pairs)  // what they remember is of where the bodies are
+  const auto evaluate = [&] {  // what pairs remember is of where the bodies are
+    for (PairContact* const pair : pairs)
       pair->evaluate(*bodies[static_cast<std::size_t>(pair->body(0))],
                      *bodies[static_cast<std::size_t>(pair->body(1))]);
+  };
+  if (begin.is_alone) {
+    if (take_momenta(bodies, begin, allowed - (now.total - now.kinetic))) evaluate();
     return;
   }
-  if (!(now.total > allowed) || !(now.kinetic > 0)) return;
+  if (!(now.total > allowed)) return;
+  if (isolated && now.total - now.kinetic > allowed) {
+    go_back(bodies, begin);
+    return evaluate();
+  }
+  if (!(now.kinetic > 0)) return;
   const double share = std::max(0.0, 1 - (now.total - allowed) / now.kinetic);
   for (WorldBody* const own : bodies) own->limit_kinetic_energy(share);
 }
 
 /// Ends the accounts of the pairs after a step. `closed`: they never gain more together than the bodies have lost, as
-/// where nothing else acts.
+/// where nothing else acts; `obstacles`: what the springs of these hold now [J].
 void end_accounts(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs, const IslandStart& start,
-                  bool closed, bool converged) noexcept {
+                  double obstacles, bool closed, bool converged) noexcept {
   double sum = 0;
   for (PairContact* const pair : pairs) {
     const WorldBody &first = *bodies[static_cast<std::size_t>(pair->body(0))],
@@ -657,7 +681,8 @@ void end_accounts(std::span<WorldBody* const> bodies, std::span<PairContact* con
     sum += pair->account();
   }
   if (!closed) return;
-  const double most = std::max(0.0, start.accounts + start.bodies.total - energy_of(bodies, pairs).total);
+  const double lost = start.bodies.total + start.obstacles - energy_of(bodies, pairs).total - obstacles;
+  const double most = std::max(0.0, start.accounts + lost);
   if (sum > most)
     for (PairContact* const pair : pairs) pair->scale_account(most / sum);
 }
@@ -729,6 +754,9 @@ NewtonReport begin_island_step(std::span<WorldBody* const> bodies, std::span<Pai
     own.problem.emplace(own.model, own.state, own.step->potential(), own.workspace);
   });
   workspace.start = start_accounts(bodies, pairs);
+  workspace.start.isolated = is_isolated(bodies);
+  if (workspace.start.isolated)
+    for (const WorldBody* const own : bodies) workspace.start.obstacles += own->near().contact.start_energy();
   return solve_island(bodies, pairs, incidences, threads, workspace);
 }
 
@@ -740,7 +768,6 @@ NewtonReport end_island_step(std::span<WorldBody* const> bodies, std::span<PairC
   if (converged) settle(bodies, workspace);
   begin_of(bodies, workspace.begin);
   workspace.from_others.resize(bodies.size());
-  const bool isolated = is_isolated(bodies, workspace.begin);
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     WorldBody& own = *bodies[i];
     Eigen::Vector3d torque = own.full ? Eigen::Vector3d(0, 0, 0) : own.near().contact.torque;
@@ -777,13 +804,16 @@ NewtonReport end_island_step(std::span<WorldBody* const> bodies, std::span<PairC
   }
   const auto is_finite = [](const WorldBody* own) { return (own->report.status & kStepNonFinite) == 0; };
   if (std::ranges::all_of(bodies, is_finite)) {
-    const double allowed = start.bodies.total + (converged ? start.accounts : start.springs);
-    const bool gains = isolated && energy_of(bodies, pairs).total > allowed + kGain * start.bodies.kinetic;
-    if (!converged || gains) limit_energy(bodies, pairs, workspace.begin, allowed);
+    const double obstacles = start.isolated ? obstacle_energy(bodies) : 0;
+    const double allowed =
+        start.bodies.total + start.obstacles - obstacles + (converged ? start.accounts : start.springs);
+    const double rounding = kGain * (std::abs(start.bodies.total) + start.bodies.kinetic + start.obstacles + obstacles);
+    const bool gains = start.isolated && energy_of(bodies, pairs).total > allowed + rounding;
+    if (!converged || gains) limit_energy(bodies, pairs, workspace.begin, start.isolated, allowed);
     // The torque that attachments have for the angular momentum may give a little energy: to take it away is no fault.
     if (gains && std::ranges::all_of(pairs, [](const PairContact* pair) { return pair->attachments().empty(); }))
       newton.status = NewtonStatus::kStagnated;
-    end_accounts(bodies, pairs, start, isolated || !converged, converged && !gains);
+    end_accounts(bodies, pairs, start, obstacles, start.isolated || !converged, converged && !gains);
     for (PairContact* const pair : pairs)
       for (PairAttachment& own : pair->attachments())
         own.end(*bodies[static_cast<std::size_t>(pair->body(0))], *bodies[static_cast<std::size_t>(pair->body(1))]);

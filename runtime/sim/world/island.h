@@ -26,8 +26,10 @@ struct IslandEnergy {
 /// Energy of an island where a step begins [J].
 struct IslandStart {
   IslandEnergy bodies;
-  double springs = 0;   ///< energy of all contacts between them
-  double accounts = 0;  ///< the most that these may ever give back
+  double springs = 0;     ///< energy of all contacts between them
+  double accounts = 0;    ///< the most that these may ever give back
+  bool isolated = false;  ///< nothing but gravity, they themselves and obstacles that stand still changes their energy
+  double obstacles = 0;   ///< energy of the springs of obstacles
 };
 
 /// Scratch of the steps of islands; grows, holds nothing from step to step.

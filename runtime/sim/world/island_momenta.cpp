@@ -60,26 +60,31 @@ void add_motion(std::span<WorldBody* const> bodies, double share, const FrameVel
   for (WorldBody* const own : bodies) own->add_motion(share, {added.at(position_of(*own) - centre), added.angular});
 }
 
-/// Without turning, by which their energy could change.
-void go_on_together(std::span<WorldBody* const> bodies, const IslandBegin& begin, double mass) {
+/// All as they were where the step began, at rest and moved on by this velocity [m/s].
+void put_back(std::span<WorldBody* const> bodies, const IslandBegin& begin, const Eigen::Vector3d& velocity) {
   add_motion(bodies, 0, {}, Eigen::Vector3d::Zero());
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     WorldBody& own = *bodies[i];
     const BodyBegin& from = begin.bodies[i];
+    const Eigen::Vector3d way = own.scene().time_step * velocity;
     if (own.full) {
-      own.full->step().put(from.q, from.elastic_energy, own.scene().time_step / mass * begin.momenta.total.linear);
-      own.placement = own.model.frame->placement(own.state.frame);
-      continue;
+      own.full->step().put(from.q, from.elastic_energy, way);
+    } else {
+      FrameMotion motion = from.motion;
+      motion.position += way;
+      motion.linear_velocity.setZero();
+      motion.angular_velocity.setZero();
+      own.state.q = own.near().q = from.q;
+      own.state.elastic_energy = from.elastic_energy;
+      own.model.frame->set_motion(motion, own.state.q, own.state.v, own.workspace.frame, own.state.frame);
     }
-    FrameMotion motion = from.motion;
-    motion.position += own.scene().time_step / mass * begin.momenta.total.linear;
-    motion.linear_velocity.setZero();
-    motion.angular_velocity.setZero();
-    own.state.q = own.near().q = from.q;
-    own.state.elastic_energy = from.elastic_energy;
-    own.model.frame->set_motion(motion, own.state.q, own.state.v, own.workspace.frame, own.state.frame);
     own.placement = own.model.frame->placement(own.state.frame);
   }
+}
+
+/// Without turning, by which their energy could change.
+void go_on_together(std::span<WorldBody* const> bodies, const IslandBegin& begin, double mass) {
+  put_back(bodies, begin, begin.momenta.total.linear / mass);
   const Together together(bodies);
   add_motion(bodies, 1, together.motion_of(begin.momenta), together.centre);
 }
@@ -89,7 +94,7 @@ void go_on_together(std::span<WorldBody* const> bodies, const IslandBegin& begin
 void begin_of(std::span<WorldBody* const> bodies, IslandBegin& begin) {
   begin.momenta = {position_of(*bodies.front()), {}};
   begin.bodies.resize(bodies.size());
-  begin.is_alone = false;
+  begin.is_alone = true;
   FrameMomenta& sum = begin.momenta.total;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const WorldBody* const own = bodies[i];
@@ -98,15 +103,19 @@ void begin_of(std::span<WorldBody* const> bodies, IslandBegin& begin) {
         own->full ? own->full->expected_momenta() : frame.expected_momenta(own->workspace.frame);
     const ContactWorkspace& obstacles = own->near().contact;
     const bool touches = own->state.contacts.count > 0 || (obstacles.candidate_count > 0 && obstacles.loaded_count > 0);
-    if (!momenta || touches || holds_modes(own->state.attachments)) return;
-    // The centre of mass goes along its momentum: where the step begins and where it ends give the same.
-    sum.linear += momenta->linear;
-    sum.angular += momenta->angular + (position_of(*own) - begin.momenta.about).cross(momenta->linear);
     begin.bodies[i].motion = frame.motion(own->state.frame);
     begin.bodies[i].q = own->state.full ? own->state.full->q : own->state.q;
     begin.bodies[i].elastic_energy = own->state.elastic_energy;
+    begin.is_alone &= momenta && !touches && !holds_modes(own->state.attachments);
+    if (!begin.is_alone) continue;
+    // The centre of mass goes along its momentum: where the step begins and where it ends give the same.
+    sum.linear += momenta->linear;
+    sum.angular += momenta->angular + (position_of(*own) - begin.momenta.about).cross(momenta->linear);
   }
-  begin.is_alone = true;
+}
+
+void go_back(std::span<WorldBody* const> bodies, const IslandBegin& begin) {
+  put_back(bodies, begin, Eigen::Vector3d::Zero());
 }
 
 bool take_momenta(std::span<WorldBody* const> bodies, const IslandBegin& begin, double allowed) {

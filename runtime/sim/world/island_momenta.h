@@ -22,11 +22,11 @@ struct BodyBegin {
   double elastic_energy = 0;  ///< [J]
 };
 
-/// Bodies where a step begins that nothing else touches.
+/// Bodies where a step begins.
 struct IslandBegin {
-  IslandMomenta momenta;  ///< as external forces alone change them in the step
   std::vector<BodyBegin> bodies;
-  bool is_alone = false;  ///< there is nothing else; else the rest is of no meaning
+  bool is_alone = false;  ///< nothing else touches them
+  IslandMomenta momenta;  ///< of bodies that are alone, as external forces change them in the step
 };
 
 /// After the solution, before the end of the step. They are not alone where something else takes part: an obstacle that
@@ -38,5 +38,9 @@ void begin_of(std::span<WorldBody* const> bodies, IslandBegin& begin);
 /// than `allowed` kinetic energy [J]. Where the rigid motion alone has more, since they were left deformed or in each
 /// other, they do not do what the step has found, but go on together, as they were, by that motion; then true.
 bool take_momenta(std::span<WorldBody* const> bodies, const IslandBegin& begin, double allowed);
+
+/// After a step that ends with more energy than there is without any motion: bodies that are not driven are where it
+/// began, at rest.
+void go_back(std::span<WorldBody* const> bodies, const IslandBegin& begin);
 
 }  // namespace exmat::runtime

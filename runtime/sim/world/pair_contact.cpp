@@ -42,7 +42,7 @@ void PairContact::reset(int first, int second, const HeldPair* held) {
   bodies_ = {first, second};
   held_ = held;
   has_first_ = is_abandoned_ = false;
-  account_ = start_energy_ = 0;
+  account_ = start_energy_ = released_ = 0;
   attachment_count_ = 0;
   for (BodyCandidates& candidates : candidates_) candidates.all.clear();
 }
@@ -55,6 +55,7 @@ void PairContact::attach(Attachment& attachment, int side, const WorldBody& firs
 void PairContact::gather(const ContactLaw& law, int side, const WorldBody& own, WorldBody& other, double margin) {
   static const std::vector<HeldBodyContact> none;
   half_ = law.half();
+  if (held_ != nullptr && held_->overlaps()) half_.friction = 0;  // nothing keeps them from leaving each other
   const auto at = static_cast<std::size_t>(side);
   const std::vector<HeldBodyContact>& held = held_ != nullptr ? held_->held[at] : none;
   const BodyContact contact(half_);
@@ -63,7 +64,10 @@ void PairContact::gather(const ContactLaw& law, int side, const WorldBody& own, 
     near.radius = -1;
     near.without = 1;
   }
-  CandidateSearch search{own.scene().time_step, margin, own.anew || other.anew, held, other.placed_shape(), near};
+  CandidateSearch search{
+      own.scene().time_step, margin, own.state.contacts.first_step || other.state.contacts.first_step, held,
+      other.placed_shape(),  near};
+  search.gravity = own.scene().gravity.norm();
   if (is_own()) return contact.gather_own(own.touching_body(), search, candidates_[at]);
   const TouchingBody its_own = own.touching_body(), its_other = other.touching_body();
   if (search.anew) {
@@ -78,15 +82,15 @@ void PairContact::begin_account() noexcept {
   const auto depth_of = [](const BodyCandidate& candidate) {
     return -candidate.normal.dot(candidate.carried) - candidate.overlap;
   };
-  double energy = 0, released = 0;
+  double energy = 0;
+  released_ = 0;
   for (const BodyCandidates& candidates : candidates_)
     for (const BodyCandidate& candidate : candidates.all) {
-      const double depth = depth_of(candidate), own = energy_of_spring(candidate, depth);
-      energy += own;
-      released += own - energy_of_spring(candidate, depth - candidate.released);
+      energy += energy_of_spring(candidate, depth_of(candidate));
+      released_ += candidate.released;
     }
   const bool is_known = held_ == nullptr || std::isfinite(held_->account);
-  account_ = !is_known ? energy : released + (held_ != nullptr ? held_->account : 0);
+  account_ = !is_known ? energy : released_ + (held_ != nullptr ? held_->account : 0);
   start_energy_ = std::min(energy, account_);
   if (energy <= account_) return;
   for (BodyCandidates& candidates : candidates_)
@@ -95,7 +99,7 @@ void PairContact::begin_account() noexcept {
 }
 
 /// Contacts may give back their losses: of springs, by friction and damping, and what backward Euler takes from the
-/// motion of the two against each other, 1/2 dt F . (u_1 - u_0).
+/// motion of the two against each other, 1/2 dt F . (u_1 - u_0). What was released and did not push is gone.
 void PairContact::end_account(const WorldBody& first, const WorldBody& second, const Eigen::Vector3d& parted,
                               bool converged) noexcept {
   double given = 0;
@@ -111,10 +115,12 @@ void PairContact::end_account(const WorldBody& first, const WorldBody& second, c
       force += (at == 0 ? 1 : -1) * candidate.force;
     }
   }
+  if (converged && released_ > 0) given = given > released_ ? given - released_ : std::min(given, 0.0);
   if (converged)
-    account_ += 0.5 * first.scene().time_step * force.dot(parted) - given;
+    account_ += 0.5 * first.scene().time_step * force.dot(parted) - given - released_;
   else
     account_ += spring_energy() - start_energy_;
+  if (released_ > 0) account_ = std::max(account_, spring_energy());
   account_ = std::isfinite(account_) ? std::max(0.0, account_) : 0;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <span>
 #include <vector>
@@ -17,6 +18,13 @@ struct HeldPair {
   std::array<std::vector<HeldBodyContact>, 2> held{};  ///< the first's vertices, the second's vertices
   double energy = 0;                                   ///< springs of all contacts at the end of the last step [J]
   double account = 0;  ///< the most that they may hold where the next step begins [J]; not finite: what they do hold
+
+  /// True if some vertices have not left what they overlapped at the start.
+  bool overlaps() const noexcept {
+    return std::ranges::any_of(held, [](const std::vector<HeldBodyContact>& side) {
+      return std::ranges::any_of(side, [](const HeldBodyContact& contact) { return contact.overlap > 0; });
+    });
+  }
 };
 
 /// A vertex of one body that touched the surface of another, or of its own, at the end of a step.
@@ -138,7 +146,7 @@ class PairContact {
   std::array<int, 2> bodies_{};
   const HeldPair* held_ = nullptr;
   ContactLaw half_;
-  double account_ = 0, start_energy_ = 0;
+  double account_ = 0, start_energy_ = 0, released_ = 0;
   bool is_abandoned_ = false;
   bool has_first_ = false;  // evaluation; where the bodies were in it
   std::array<Placement, 2> first_{};

@@ -64,9 +64,9 @@ bool World::is_attached(int body) const noexcept {
 
 void World::forget(int body) {
   if (!at(body).state->full) drop_full_scratch(at(body));
+  state(body).contacts.first_step = true;
   if (!at(body).touching) return;
   wake_neighbours(body);
-  touching(body).anew = true;
   at(body).is_bounded = false;
   std::erase_if(held_, [=](const HeldPair& held) { return held.first == body || held.second == body; });
   for (std::size_t p = 0; p < near_.size(); ++p)
@@ -120,8 +120,7 @@ void World::fit_attachments(int body) {
   scratch(body).fit(*own.kind.model, *own.kind.scene, own.state->attachments);
 }
 
-void World::set_memory(std::vector<HeldPair> held, const std::vector<bool>& anew) {
-  for (int body = 0; body < count(); ++body) set_anew(body, anew[static_cast<std::size_t>(body)]);
+void World::set_memory(std::vector<HeldPair> held) {
   held_ = std::move(held);
   take_states();
 }
@@ -374,15 +373,12 @@ NewtonReport World::step_in_parts(Island& island, int threads) {
   auto& [bodies, numbers, pairs, near, incidences, held, workspace, newton, divided] = island;
   std::deque<DividedStep> steps;
   for (const WorldBody* const own : bodies) steps.emplace_back(own->scene(), own->state);
-  std::vector<bool> anew;
-  for (const WorldBody* const own : bodies) anew.push_back(own->anew);
   NewtonReport sum;
   const auto begin = [&](int parts) {
     sum = {};
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       steps[i].begin(parts);
       bodies[i]->take_scene(steps[i].scene());
-      bodies[i]->anew = anew[i];
     }
   };
   const auto take = [&](int part) {
@@ -394,7 +390,6 @@ NewtonReport World::step_in_parts(Island& island, int threads) {
     if (sum.status == NewtonStatus::kConverged) sum.status = before;
     std::uint32_t status = 0;
     for (std::size_t i = 0; i < bodies.size(); ++i) {
-      bodies[i]->anew = false;
       steps[i].end_part(bodies[i]->report);
       status |= bodies[i]->report.status;
     }
@@ -671,7 +666,6 @@ void World::remember() {
   }
   next.resize(kept);
   held_.swap(next);
-  for (const int body : touching_) touching(body).anew = false;
 }
 
 Energies World::energies(int body) const noexcept {

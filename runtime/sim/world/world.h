@@ -83,16 +83,11 @@ class World {
 
   /// Contacts of bodies that touched each other at the end of the last step, in ascending order.
   const std::vector<HeldPair>& held() const noexcept { return held_; }
-  /// True until the first step after a body was placed by hand, if it may touch others.
-  bool is_anew(int body) const noexcept { return at(body).touching && at(body).touching->anew; }
-  /// Goes on from what held() and is_anew() gave of a world of such bodies.
-  void set_memory(std::vector<HeldPair> held, const std::vector<bool>& anew);
+  /// Goes on from what held() gave of a world of such bodies.
+  void set_memory(std::vector<HeldPair> held);
   /// The same piece by piece, into the memory that is there; after all of it, and after the states of all bodies were
   /// set, take_states().
   std::vector<HeldPair>& held() noexcept { return held_; }
-  void set_anew(int body, bool anew) noexcept {
-    if (at(body).touching) at(body).touching->anew = anew;
-  }
   void take_states();
   /// Contacts with obstacles in the last step of a body that touched no other: they keep one of space `auto` full.
   int lone_contacts(int body) const noexcept { return is_in_island(body) ? 0 : at(body).report.contacts; }

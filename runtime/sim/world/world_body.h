@@ -39,7 +39,6 @@ struct WorldBody {
   SurfaceShape shape;
   StepReport report;
   double travel = 0;                 ///< most that a vertex goes in a step at its velocity [m]
-  bool anew = true;                  ///< no step has led to where it is: what it overlaps was not watched coming
   std::unique_ptr<FullMember> full;  ///< while it is in full space
 
   // State of one step.

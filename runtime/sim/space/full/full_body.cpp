@@ -287,6 +287,7 @@ void FullBodyStep::set_reduced() noexcept {
   state_.time = motion.time;
   state_.elastic_energy = motion.elastic_energy;
   state_.begins_anew = motion.begins_anew;
+  state_.contacts.first_step = false;
 }
 
 const StepReport& FullBodyStep::finish(const FrameMomenta& others) noexcept {

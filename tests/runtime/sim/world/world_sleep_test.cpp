@@ -109,7 +109,7 @@ TEST(WorldSleep, GoesOnFromItsMemoryToTheLastBit) {
   std::vector<WorldBodyStart> kept = piles.stack();
   for (int i = 0; i < 3; ++i) kept[static_cast<std::size_t>(i)].state = world.state(i);
   World other(std::move(kept), {1e7, 1e5, 0.5});
-  other.set_memory(world.held(), {false, false, false});
+  other.set_memory(world.held());
   for (World* each : {&world, &other}) {
     for (int i = 0; i < 20; ++i) EXPECT_EQ(each->step(1).asleep, 3);
     each->state(1).applied_force[0] += 1e-3;
