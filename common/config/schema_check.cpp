@@ -25,6 +25,7 @@ using Adapter = valijson::adapters::NlohmannJsonAdapter;
 
 constexpr std::size_t kLongestValue = 60;
 constexpr const char* kLater = "x-later";
+constexpr const char* kAdvice = "x-advice";
 
 std::string show(const Json& value) {
   std::string text = value.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -124,7 +125,7 @@ class FaultFinder {
   }
 
   static std::optional<Complaint> mismatch(const Json& schema, const Json& value, const Json::json_pointer& place) {
-    return Complaint{"", place.to_string(), expectation(schema), show(value), ""};
+    return Complaint{"", place.to_string(), expectation(schema), show(value), schema.value(kAdvice, std::string())};
   }
 
   static std::optional<Complaint> not_yet(const Json& value, const Json::json_pointer& place) {

@@ -323,7 +323,12 @@ const BadConfig kBadScenes[] = {
     {"NegativeFriction", obstacle(R"("sphere": {"radius": 1}, "friction": -1)"),
      "a.json: /obstacles/0/friction: expected a number >= 0, found -1"},
     {"SoftObstacle", obstacle(R"("sphere": {"radius": 1}, "stiffness": 0)"),
-     "a.json: /obstacles/0/stiffness: expected a number > 0, found 0"},
+     "a.json: /obstacles/0/stiffness: expected a number > 0 and <= 1e+15, found 0; steel"},
+    {"ObstacleStifferThanSteel", obstacle(R"("sphere": {"radius": 1}, "stiffness": 1e16)"),
+     "a.json: /obstacles/0/stiffness: expected a number > 0 and <= 1e+15, found 1e+16; steel that is 1 mm thick has "
+     "2e14"},
+    {"ContactStifferThanSteel", scene(R"("contact": {"stiffness": 1e16})"),
+     "a.json: /contact/stiffness: expected a number > 0 and <= 1e+15, found 1e+16; steel that is 1 mm thick has 2e14"},
     {"NotAUnitQuaternion", obstacle(R"("box": {"half_extents": [1, 1, 1], "orientation": [1, 1, 0, 0]})"),
      "a.json: /obstacles/0/box/orientation: expected a quaternion of length 1, w first, found length 1.41421"},
     {"KeyWithoutTime", obstacle(R"("sphere": {"radius": 1}, "motion": [{"position": [0, 0, 0]}])"),

@@ -346,6 +346,9 @@ TEST_F(ApiWorldTest, WrongArgumentsAreRefusedInWords) {
     EXPECT_EQ(none, nullptr);
   }
   wrong = law();
+  wrong.stiffness = 1e16;
+  says(exmat_world_create(&wrong, &none), "law.stiffness = 1e+16: expected a number above 0, of at most 1e+15; steel");
+  wrong = law();
   wrong.self = 2;
   says(exmat_world_create(&wrong, &none), "law.self = 2: expected 0 or 1");
   wrong = law();

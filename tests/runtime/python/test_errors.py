@@ -287,6 +287,16 @@ def test_obstacles_beyond_all_scales_are_refused():
         world.move_obstacle(ball, exmat.Motion(linear_velocity=(1e306, 0, 0)))
 
 
+def test_contacts_stiffer_than_steel_are_refused():
+    ball, stiffer = exmat.Shape.sphere(1), r"stiffness = 1e\+16: expected a number above 0, of at most 1e\+15; steel that is 1 mm thick has 2e14 N/m\^3"
+    world = exmat.World(stiffness=1e15)
+    obstacle = world.add_obstacle(ball, stiffness=1e15)
+    for call in (lambda: exmat.World(stiffness=1e16), lambda: world.add_obstacle(ball, stiffness=1e16),
+                 lambda: world.set_obstacle_law(obstacle, stiffness=1e16)):
+        with pytest.raises(exmat.InvalidArgument, match=stiffer):
+            call()
+
+
 def test_a_child_of_fork_steps_on(model):
     batch = exmat.Batch(model, 20)
     batch.step(2, threads=2)
