@@ -326,6 +326,7 @@ void require_files(const AssetConfig& asset) {
 
 AssetConfig asset_of(const Json& json, const std::filesystem::path& file) {
   check_against_schema(json, "asset", file);
+  check_numbers(json, file);
   return AssetReader(file).read(json);
 }
 

@@ -19,4 +19,8 @@ nlohmann::json parse_json(const std::string& text, const std::string& name);
 void check_against_schema(const nlohmann::json& document, const std::string& schema_name,
                           const std::filesystem::path& file);
 
+/// Throws InputError at the first number that is none to compute with: larger than kFarthest in magnitude, or so small
+/// that a double has not all its digits (subnormal).
+void check_numbers(const nlohmann::json& document, const std::filesystem::path& file);
+
 }  // namespace exmat

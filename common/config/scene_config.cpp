@@ -209,6 +209,7 @@ SceneConfig scene_of(const Json& shared, const Json& own, const std::filesystem:
 
 void check_scene(const Json& json, const std::filesystem::path& file) {
   check_against_schema(json, "scene", file);
+  check_numbers(json, file);
   if (json.contains("bundle") == json.contains("bodies"))
     throw InputError({file.string(), "/", "bundle or bodies", json.contains("bundle") ? "both" : "neither", ""});
 }

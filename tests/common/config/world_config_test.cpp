@@ -156,7 +156,8 @@ TEST_F(WorldConfigTest, PosesAreLines) {
 TEST_F(WorldConfigTest, BadPosesAreRefusedWithTheirLine) {
   EXPECT_THAT(refused_poses("1 2 3\n1 2\n"), HasSubstr("line 2"));
   EXPECT_THAT(refused_poses("1 2 three\n"), HasSubstr("line 1"));
-  EXPECT_THAT(refused_poses("1 2 nan\n"), HasSubstr("finite"));
+  for (const char* const line : {"1 2 nan\n", "1 2 -1e31\n"})
+    EXPECT_THAT(refused_poses(line), HasSubstr("finite numbers of at most 1e+30"));
   EXPECT_THAT(refused_poses("1 2 3 1 1 0 0\n"), HasSubstr("length 1"));
   EXPECT_THAT(refused_poses("# nothing\n"), HasSubstr("a line for each body"));
 }
