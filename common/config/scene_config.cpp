@@ -353,8 +353,8 @@ void require_files(const SceneConfig& scene) {
   require_obstacle_files(scene);
 }
 
-std::vector<ObstacleFile> obstacle_files(const SceneConfig& scene) {
-  std::vector<ObstacleFile> files;
+std::vector<NamedFile> obstacle_files(const SceneConfig& scene) {
+  std::vector<NamedFile> files;
   for (std::size_t i = 0; i < scene.obstacles.size(); ++i) {
     const auto& shape = scene.obstacles[i].shape;
     if (const auto* mesh = std::get_if<MeshConfig>(&shape))

@@ -98,6 +98,19 @@ class Commands(unittest.TestCase):
         (self.folder / "bar.glb").symlink_to("bar.h5")
         self.refused("export", "t.h5", "-o", "bar.glb", said=["-o"])
 
+    def test_files_that_an_asset_names_are_inputs_also_where_they_are_not_read(self):
+        """The scene has no examples, so that none is read."""
+        asset = json.loads((self.folder / "asset.json").read_text())
+        for name in ("rest.veg", "bent.veg"):
+            shutil.copy(self.folder / "bar.veg", self.folder / name)
+        (self.folder / "part.txt").write_text("1, 2\n")
+        asset |= {"examples": [{"name": "rest", "mesh": "rest.veg", "rest": True}, {"name": "bent", "mesh": "bent.veg"}],
+                  "regions": [{"name": "part", "vertices": {"file": "part.txt"}, "examples": ["bent"]}]}
+        write_json(self.folder / "examples.json", asset)
+        for name in ("rest.veg", "bent.veg", "part.txt"):
+            for outputs in (["-o", name], ["-o", "new.h5", "--report", name], ["-o", "new.h5", "--depfile", name]):
+                self.refused("bundle", "examples.json", "--scene", "scene.json", *outputs, said=[name, "does not read"])
+
     def test_a_pack_steps_as_its_bundle(self):
         self.command("pack", "bar.h5", "-o", "whole.exmat")
         self.command("pack", "bar.h5", "-o", "least.exmat", "--scene", "scene.json")
