@@ -166,6 +166,26 @@ class Commands(unittest.TestCase):
                       ["study", "study.json", "-o", "bar.veg"], ["study", "--stability", "scene.json", "-o", "scene.json"]):
             self.refused(*words, said=[words[-2], "expected a folder"])
 
+    def test_outputs_have_a_folder_before_any_work(self):
+        """Runs of as many steps would not end."""
+        write_json(self.folder / "long.json", {"bundle": "bar.h5", "steps": 10 ** 12})
+        (self.folder / "dangling.h5").symlink_to("nodir/x.h5")
+        bundle = ["bundle", "asset.json", "-o", "new.h5"]
+        for name in ("nodir/x.h5", "dangling.h5", "asset.json/x.h5"):
+            for words in (["run", "long.json", "-o", name], ["run", "long.json", "--dump-state", name], ["full-space", "long.json", "-o", name],
+                          ["bundle", "asset.json", "-o", name], ["mesh", "surface.obj", "-o", name], ["pack", "bar.h5", "-o", name],
+                          ["export", "bar.h5", "-o", name], [*bundle, "--report", name], [*bundle, "--depfile", name],
+                          ["bundle", "surface.obj", "-o", "new.h5", "--write-asset", name]):
+                self.refused(*words, said=[words[-2], "expected a name in a folder that exists, found no folder"])
+        for option in ("-o", "--dump-state"):
+            self.refused("run", "long.json", option, "new.h5/", said=[option, "found the name of a folder"])
+        self.refused(*bundle, "--cache", "new.h5/", said=["--cache", "that of -o"])
+        for name in ("asset.json/x", "asset.json/x/y", "/proc/x"):
+            for words in ([*bundle, "--cache", name], [*bundle, "--alignment-report", name], ["check", "asset.json", "--alignment-report", name],
+                          ["study", "study.json", "-o", name], ["study", "--stability", "scene.json", "-o", name], ["new", "surface.obj", "-o", name]):
+                self.refused(*words, said=[words[-2], "expected a folder, or one that can be made"])
+        self.command(*bundle, "--cache", "some/new/folder/")
+
     def test_outputs_are_files(self):
         """Before any work: runs of as many steps would not end."""
         write_json(self.folder / "long.json", {"bundle": "bar.h5", "steps": 10 ** 12})
