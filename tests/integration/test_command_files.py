@@ -111,6 +111,17 @@ class Commands(unittest.TestCase):
             for outputs in (["-o", name], ["-o", "new.h5", "--report", name], ["-o", "new.h5", "--depfile", name]):
                 self.refused("bundle", "examples.json", "--scene", "scene.json", *outputs, said=[name, "does not read"])
 
+    def test_a_body_where_numbers_lose_its_shape_is_warned_of(self):
+        asset = json.loads((self.folder / "asset.json").read_text())
+        del asset["object"]["fixed"]
+        write_json(self.folder / "free.json", asset)
+        self.command("bundle", "free.json", "-o", "free.h5")
+        for place, said in ((4.5e15, "starts 4.5e+15 m from the origin"), (1e30, "starts 1e+30 m from the origin"), (100, "")):
+            write_json(self.folder / "far.json", {"bundle": "free.h5", "steps": 3, "body": {"position": [0, place, 0]}})
+            errors = self.command("run", "far.json")
+            self.assertEqual("from the origin" in errors, bool(said), errors)
+            self.assertIn(said, errors)
+
     def test_a_pack_steps_as_its_bundle(self):
         self.command("pack", "bar.h5", "-o", "whole.exmat")
         self.command("pack", "bar.h5", "-o", "least.exmat", "--scene", "scene.json")
