@@ -306,26 +306,53 @@ class AssetReader {
 
 AssetConfig load_asset(const std::filesystem::path& file) { return asset_of(read_json(file), file); }
 
-void require_files(const AssetConfig& asset) {
-  const auto require = [&](const std::filesystem::path& file, const std::string& place, const char* expected) {
-    require_file(file, asset.file, place, expected);
+std::vector<NamedFile> named_files(const AssetConfig& asset) {
+  std::vector<NamedFile> files;
+  const auto add = [&](const std::filesystem::path& file, std::string place, const char* kind) {
+    files.push_back({file, std::move(place), kind});
   };
-  require(asset.object_mesh, asset.object_surface ? "/object/surface" : "/object/mesh",
-          asset.object_surface ? "a surface" : "a mesh of tets");
-  if (asset.render_mesh) require(*asset.render_mesh, "/object/render_mesh", "a surface");
+  const auto add_ids = [&](const auto& selection, const std::string& place) {
+    if (const auto* ids = std::get_if<FileSelection>(&selection)) add(ids->file, place + "/file", "a text file of ids");
+  };
+  add(asset.object_mesh, asset.object_surface ? "/object/surface" : "/object/mesh",
+      asset.object_surface ? "a surface" : "a mesh of tets");
+  if (asset.render_mesh) add(*asset.render_mesh, "/object/render_mesh", "a surface");
+  if (asset.fixed) add_ids(*asset.fixed, "/object/fixed");
+  for (std::size_t i = 0; i < asset.material_regions.size(); ++i)
+    add_ids(asset.material_regions[i].tets, fmt::format("/object/materials/{}/tets", i));
   for (std::size_t i = 0; i < asset.examples.size(); ++i) {
     const ExampleConfig& example = asset.examples[i];
-    if (!example.mesh.empty()) require(example.mesh, fmt::format("/examples/{}/mesh", i), "a mesh of tets");
-    if (example.surface) require(*example.surface, fmt::format("/examples/{}/surface", i), "a surface");
+    if (!example.mesh.empty()) add(example.mesh, fmt::format("/examples/{}/mesh", i), "a mesh of tets");
+    if (example.surface) add(*example.surface, fmt::format("/examples/{}/surface", i), "a surface");
   }
-  if (asset.alignment.landmarks)
-    require(*asset.alignment.landmarks, "/alignment/landmarks", "a text file of landmarks");
+  for (std::size_t i = 0; i < asset.regions.size(); ++i) {
+    add_ids(asset.regions[i].vertices, fmt::format("/regions/{}/vertices", i));
+    if (const auto& own = asset.regions[i].example_vertices)
+      add_ids(*own, fmt::format("/regions/{}/example_vertices", i));
+  }
+  if (asset.alignment.landmarks) add(*asset.alignment.landmarks, "/alignment/landmarks", "a text file of landmarks");
   for (std::size_t i = 0; i < asset.alignment.maps.size(); ++i)
-    require(asset.alignment.maps[i].file, fmt::format("/alignment/map/{}/file", i), "a text file of vertex numbers");
+    add(asset.alignment.maps[i].file, fmt::format("/alignment/map/{}/file", i), "a text file of vertex numbers");
+  for (std::size_t i = 0; i < asset.alignment.regions.size(); ++i) {
+    const CorrespondingRegionConfig& part = asset.alignment.regions[i];
+    add_ids(part.object, fmt::format("/alignment/regions/{}/object", i));
+    for (std::size_t k = 0; k < part.examples.size(); ++k)
+      add_ids(part.examples[k].vertices, fmt::format("/alignment/regions/{}/examples/{}/vertices", i, k));
+  }
+  if (asset.training.loads)
+    for (std::size_t i = 0; i < asset.training.loads->forces.size(); ++i)
+      add_ids(asset.training.loads->forces[i].vertices, fmt::format("/basis/loads/forces/{}/vertices", i));
+  if (asset.contact_vertices) add_ids(*asset.contact_vertices, "/contact/vertices");
+  return files;
+}
+
+void require_files(const AssetConfig& asset) {
+  for (const auto& [file, place, kind] : named_files(asset)) require_file(file, asset.file, place, kind);
 }
 
 AssetConfig asset_of(const Json& json, const std::filesystem::path& file) {
   check_against_schema(json, "asset", file);
+  check_numbers(json, file);
   return AssetReader(file).read(json);
 }
 

@@ -9,6 +9,7 @@
 #include <variant>
 #include <vector>
 
+#include "common/config/named_file.h"
 #include "common/config/vertex_selection.h"
 #include "common/elastic/material_model.h"
 #include "common/mesh/tet_mesh.h"
@@ -166,7 +167,10 @@ struct AssetConfig {
   double length_unit = 1;  ///< unit of the numbers of all meshes [m]
 };
 
-/// Throws InputError that names the asset's member where a mesh, a surface, landmarks or a map are not there.
+/// The files that the asset names, whether they are read or not.
+std::vector<NamedFile> named_files(const AssetConfig& asset);
+
+/// Throws InputError that names the asset's member where one of them is not there.
 void require_files(const AssetConfig& asset);
 
 }  // namespace exmat

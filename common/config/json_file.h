@@ -15,8 +15,12 @@ nlohmann::json parse_json(const std::string& text, const std::string& name);
 
 /// Throws InputError unless the document follows schemas/NAME.json: at the first fault, with its JSON pointer, what was
 /// expected and found. An unknown member suggests the nearest name; what the schema lists as x-later is refused as not
-/// supported yet.
+/// supported yet, and its x-advice is said with what is refused.
 void check_against_schema(const nlohmann::json& document, const std::string& schema_name,
                           const std::filesystem::path& file);
+
+/// Throws InputError at the first number that is none to compute with: larger than kFarthest in magnitude, or so small
+/// that a double has not all its digits (subnormal).
+void check_numbers(const nlohmann::json& document, const std::filesystem::path& file);
 
 }  // namespace exmat

@@ -7,6 +7,7 @@
 
 #include "common/core/error.h"
 #include "common/core/input_file.h"
+#include "common/core/number_limits.h"
 
 namespace exmat {
 namespace {
@@ -22,8 +23,9 @@ std::vector<double> numbers_of(const std::string& line, const std::filesystem::p
     if (*at == '\0') return numbers;
     char* end = nullptr;
     const double number = std::strtod(at, &end);
-    if (end == at || !std::isfinite(number))
-      throw InputError({file.string(), place, "3 or 7 finite numbers", fmt::format("\"{}\"", line), ""});
+    if (end == at || !is_near(number))
+      throw InputError({file.string(), place, fmt::format("3 or 7 finite numbers of at most {:g}", kFarthest),
+                        fmt::format("\"{}\"", line), ""});
     numbers.push_back(number);
     at = end;
   }

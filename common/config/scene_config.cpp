@@ -209,6 +209,7 @@ SceneConfig scene_of(const Json& shared, const Json& own, const std::filesystem:
 
 void check_scene(const Json& json, const std::filesystem::path& file) {
   check_against_schema(json, "scene", file);
+  check_numbers(json, file);
   if (json.contains("bundle") == json.contains("bodies"))
     throw InputError({file.string(), "/", "bundle or bodies", json.contains("bundle") ? "both" : "neither", ""});
 }
@@ -256,16 +257,31 @@ std::vector<BodyPlace> read_grid(const Json& grid) {
   return places;
 }
 
-std::vector<BodyPlace> read_places(const Json& own, const std::filesystem::path& file, const std::string& place) {
+/// Places of a kind of bodies that follows `before` others.
+std::vector<BodyPlace> read_places(const Json& own, const std::filesystem::path& file, const std::string& place,
+                                   std::size_t before) {
+  constexpr std::size_t kMostBodies = 100000;  // as many as a list of the schema has
+  const auto require_room = [&](std::size_t count, const char* member) {
+    if (before + count > kMostBodies)
+      throw InputError({file.string(), place + member, fmt::format("at most {} bodies in a scene", kMostBodies),
+                        fmt::format("{}", before + count), ""});
+  };
   if (own.contains("grid") && own.contains("poses"))
     throw InputError({file.string(), place, "grid or poses", "both", ""});
-  if (own.contains("grid")) return read_grid(own["grid"]);
+  if (own.contains("grid")) {
+    std::size_t count = 1;
+    for (const Json& along : own["grid"]["counts"]) count *= along.get<std::size_t>();
+    require_room(count, "/grid/counts");
+    return read_grid(own["grid"]);
+  }
+  std::vector<BodyPlace> places{BodyPlace{}};
   if (own.contains("poses")) {
     const std::filesystem::path poses = resolve_path(file, own["poses"]);
     require_file(poses, file, place + "/poses", "a text file of poses");
-    return read_poses(poses);
+    places = read_poses(poses);
   }
-  return {BodyPlace{}};
+  require_room(places.size(), own.contains("poses") ? "/poses" : "");
+  return places;
 }
 
 }  // namespace
@@ -297,11 +313,13 @@ WorldConfig world_of(const Json& json, const std::filesystem::path& file) {
   refuse_members_of_one_body(json, file);
   WorldConfig world;
   world.file = file;
+  std::size_t count = 0;
   for (std::size_t i = 0; i < json["bodies"].size(); ++i) {
     const Json& own = json["bodies"][i];
     const std::string place = fmt::format("/bodies/{}", i);
     check_name(own["name"], file, place);
-    BodiesConfig bodies{own["name"], scene_of(json, own, file, place), read_places(own, file, place)};
+    BodiesConfig bodies{own["name"], scene_of(json, own, file, place), read_places(own, file, place, count)};
+    count += bodies.places.size();
     if (std::ranges::find(world.bodies, bodies.name, &BodiesConfig::name) != world.bodies.end())
       throw InputError(
           {file.string(), place + "/name", "each name once", fmt::format("\"{}\" again", bodies.name), ""});
@@ -335,8 +353,8 @@ void require_files(const SceneConfig& scene) {
   require_obstacle_files(scene);
 }
 
-std::vector<ObstacleFile> obstacle_files(const SceneConfig& scene) {
-  std::vector<ObstacleFile> files;
+std::vector<NamedFile> obstacle_files(const SceneConfig& scene) {
+  std::vector<NamedFile> files;
   for (std::size_t i = 0; i < scene.obstacles.size(); ++i) {
     const auto& shape = scene.obstacles[i].shape;
     if (const auto* mesh = std::get_if<MeshConfig>(&shape))

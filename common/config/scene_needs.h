@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "common/config/named_file.h"
 #include "common/config/scene_config.h"
 #include "common/model/needs.h"
 
@@ -17,13 +18,8 @@ void set_trajectory(const std::optional<std::filesystem::path>& file, WorldConfi
 /// Throws InputError that names the scene's member where the bundle is not there, or a file of an obstacle.
 void require_files(const SceneConfig& scene);
 
-/// A file that obstacles are made of, the place in the scene that names it, and what it is.
-struct ObstacleFile {
-  std::filesystem::path file;
-  std::string place;
-  const char* kind;
-};
-std::vector<ObstacleFile> obstacle_files(const SceneConfig& scene);
+/// The files that obstacles are made of.
+std::vector<NamedFile> obstacle_files(const SceneConfig& scene);
 
 /// require_files() of the obstacles alone.
 void require_obstacle_files(const SceneConfig& scene);

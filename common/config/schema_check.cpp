@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
 #include <optional>
+#include <ranges>
 #include <stdexcept>
 #include <valijson/adapters/nlohmann_json_adapter.hpp>
 #include <valijson/schema.hpp>
@@ -13,6 +15,7 @@
 #include "common/config/json_file.h"
 #include "common/core/error.h"
 #include "common/core/nearest_name.h"
+#include "common/core/number_limits.h"
 
 // valijson decides whether a document is valid. Its messages name schema keywords, so the first fault is then looked up
 // here in the words of the schema's own descriptions.
@@ -25,6 +28,7 @@ using Adapter = valijson::adapters::NlohmannJsonAdapter;
 
 constexpr std::size_t kLongestValue = 60;
 constexpr const char* kLater = "x-later";
+constexpr const char* kAdvice = "x-advice";
 
 std::string show(const Json& value) {
   std::string text = value.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -124,7 +128,7 @@ class FaultFinder {
   }
 
   static std::optional<Complaint> mismatch(const Json& schema, const Json& value, const Json::json_pointer& place) {
-    return Complaint{"", place.to_string(), expectation(schema), show(value), ""};
+    return Complaint{"", place.to_string(), expectation(schema), show(value), schema.value(kAdvice, std::string())};
   }
 
   static std::optional<Complaint> not_yet(const Json& value, const Json::json_pointer& place) {
@@ -211,7 +215,34 @@ class FaultFinder {
   const Json& root_;
 };
 
+/// The first number, in reading order, that check_numbers() refuses, and the way there from its end; null: none.
+const Json* find_absurd(const Json& value, std::vector<std::string>& way) {
+  if (value.is_number()) {
+    const double number = value.get<double>();
+    return is_near(number) && (number == 0 || std::isnormal(number)) ? nullptr : &value;
+  }
+  if (!value.is_structured()) return nullptr;
+  for (const auto& member : value.items())
+    if (const Json* const found = find_absurd(member.value(), way)) {
+      way.push_back(member.key());
+      return found;
+    }
+  return nullptr;
+}
+
 }  // namespace
+
+void check_numbers(const Json& document, const std::filesystem::path& file) {
+  std::vector<std::string> way;
+  const Json* const found = find_absurd(document, way);
+  if (found == nullptr) return;
+  Json::json_pointer place;
+  for (const std::string& member : way | std::views::reverse) place /= member;
+  throw InputError({file.string(), place.to_string(),
+                    is_near(found->get<double>()) ? "0, or a number of at least 2.3e-308 in magnitude"
+                                                  : fmt::format("a number of at most {:g} in magnitude", kFarthest),
+                    show(*found), "mend the number or its unit"});
+}
 
 void check_against_schema(const Json& document, const std::string& schema_name, const std::filesystem::path& file) {
   const Json schema_json = Json::parse(embedded_schema(schema_name));

@@ -75,10 +75,6 @@ bool is_left_behind(std::string_view name, std::string_view prefix) {
   return ::kill(process, 0) != 0 && errno == ESRCH;
 }
 
-std::filesystem::path folder_of(const std::filesystem::path& target) {
-  return target.has_parent_path() ? target.parent_path() : std::filesystem::path(".");
-}
-
 // A temporary file begins with its target's name, with as much of it as leaves room for the rest.
 std::string beginning_of(const std::filesystem::path& target) {
   constexpr std::size_t kMost = 128;
@@ -89,14 +85,14 @@ std::string beginning_of(const std::filesystem::path& target) {
 void remove_left_behind(const std::filesystem::path& target) {
   const std::string prefix = beginning_of(target) + own_prefix();
   std::error_code error;
-  for (std::filesystem::directory_iterator entry(folder_of(target), error), end; !error && entry != end;
+  for (std::filesystem::directory_iterator entry(parent_folder(target), error), end; !error && entry != end;
        entry.increment(error))
     if (is_left_behind(entry->path().filename().string(), prefix)) ::unlink(entry->path().c_str());
 }
 
 void check_target(const std::filesystem::path& target) {
   std::error_code ignored;
-  const auto folder = folder_of(target);
+  const auto folder = parent_folder(target);
   if (!std::filesystem::exists(folder, ignored)) fail(target, "there is no folder " + folder.string());
   const auto status = std::filesystem::status(target, ignored);
   if (std::filesystem::is_directory(status)) fail(target, "it is a folder");
@@ -164,7 +160,7 @@ AtomicFile::AtomicFile(std::filesystem::path target) : target_(std::move(target)
   check_target(file_);
   remove_left_behind(file_);
   for (int attempt = 0; attempt < kNameAttempts; ++attempt) {
-    temporary_ = folder_of(file_) / (beginning_of(file_) + own_suffix());
+    temporary_ = parent_folder(file_) / (beginning_of(file_) + own_suffix());
     slot_ = add_pending(temporary_, target_);
     const Descriptor descriptor(temporary_, O_WRONLY | O_CREAT | O_EXCL);
     const int error_number = errno;
@@ -189,7 +185,7 @@ void AtomicFile::commit() {
   if (::rename(temporary_.c_str(), file_.c_str()) != 0) fail(target_, errno);
   pending_ = false;
   remove_pending(std::exchange(slot_, -1));
-  flush_folder(folder_of(file_));
+  flush_folder(parent_folder(file_));
 }
 
 void end_by_signal(int signal) {

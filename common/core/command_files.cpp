@@ -25,13 +25,13 @@ struct Identity {
   bool operator==(const Identity&) const = default;
 };
 
-Identity identity_of(const std::filesystem::path& file) {
+Identity identity_of(std::filesystem::path file) {
+  if (!file.has_filename()) file = file.parent_path();  // a folder with a slash at its end
   struct stat status {};
   if (::stat(file.c_str(), &status) == 0) return {true, status.st_dev, status.st_ino, {}};
   std::error_code ignored;
   const auto target = link_target(file);
-  const auto folder = std::filesystem::weakly_canonical(
-      target.has_parent_path() ? target.parent_path() : std::filesystem::path("."), ignored);
+  const auto folder = std::filesystem::weakly_canonical(parent_folder(target), ignored);
   return {false, 0, 0, folder / target.filename()};
 }
 
@@ -106,8 +106,38 @@ void claim(const std::filesystem::path& file, const std::string& role) {
   if (const auto known = allowed_output(file, role)) registry().outputs.push_back(*known);
 }
 
+/// Throws InputError unless the folder of the file is there, or is one that the command fills.
+void require_folder(const std::filesystem::path& file, const std::string& role) {
+  if (registry().commands == 0) return;
+  if (file.is_relative()) current_folder();
+  std::error_code ignored;
+  const auto folder = parent_folder(link_target(file));
+  const std::lock_guard lock(registry().mutex);
+  if (std::filesystem::is_directory(folder, ignored) || find(registry().outputs, identity_of(folder)) != nullptr)
+    return;
+  throw InputError({file.string(), role, "a name in a folder that exists", "no folder " + folder.string(),
+                    "make the folder, or choose another name"});
+}
+
+/// Throws InputError where the folder is none and cannot be made: the first that is missing is made and removed.
+void require_making(std::filesystem::path folder, const std::string& role) {
+  if (registry().commands == 0) return;
+  if (folder.is_relative()) current_folder();
+  const std::string name = folder.string();
+  if (!folder.has_filename()) folder = folder.parent_path();
+  std::error_code error;
+  if (std::filesystem::exists(folder, error)) return;
+  while (!std::filesystem::exists(parent_folder(folder), error)) folder = parent_folder(folder);
+  if (std::filesystem::create_directory(folder, error)) std::filesystem::remove(folder, error);
+  if (error)
+    throw InputError({name, role, "a folder, or one that can be made", error.message(), "choose another name"});
+}
+
 void require_regular(const std::filesystem::path& file, const std::string& role) {
   std::error_code ignored;
+  if (!file.has_filename())
+    throw InputError(
+        {file.string(), role, "a file, or the name of a new one", "the name of a folder", "choose another name"});
   const auto status = std::filesystem::status(file, ignored);
   if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
     throw InputError({file.string(), role, "a file, or the name of a new one",
@@ -124,6 +154,7 @@ void check_output(const std::filesystem::path& file, const std::string& role) {
 
 void claim_output(const std::filesystem::path& file, const std::string& role) {
   require_regular(file, role);
+  require_folder(file, role);
   claim(file, role);
 }
 
@@ -132,6 +163,7 @@ void claim_folder(const std::filesystem::path& folder, const std::string& role) 
   if (std::filesystem::exists(folder, ignored) && !std::filesystem::is_directory(folder, ignored))
     throw InputError({folder.string(), role, "a folder, or the name of a new one", "a file", "choose another name"});
   claim(folder, role);
+  require_making(folder, role);
 }
 
 void check_input(const std::filesystem::path& file, const std::string& expected) {
@@ -159,6 +191,10 @@ std::filesystem::path link_target(std::filesystem::path target) {
   }
   throw InputError({name, "", "a name, or links that lead to one", "links that lead to each other",
                     "remove them, or choose another name"});
+}
+
+std::filesystem::path parent_folder(const std::filesystem::path& file) {
+  return file.has_parent_path() ? file.parent_path() : std::filesystem::path(".");
 }
 
 std::filesystem::path current_folder() {

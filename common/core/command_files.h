@@ -17,14 +17,15 @@ class CommandFiles {
 };
 
 /// Announces that the command writes `file`; `role` names it in messages, as "-o". Throws InputError where the command
-/// has read the file, or claims it for another output, and where it is a folder, a pipe or a device. Call it before any
-/// work.
+/// has read the file, or claims it for another output, where it is a folder, a pipe or a device, and where its folder
+/// is neither there nor claimed. Call it before any work.
 void claim_output(const std::filesystem::path& file, const std::string& role);
 
 /// The same of a file that is about to be written, now and perhaps again: it is not claimed.
 void check_output(const std::filesystem::path& file, const std::string& role);
 
-/// The same of a folder that the command fills. Throws InputError also where it is a file.
+/// The same of a folder that the command fills, before the files in it. Throws InputError also where it is a file, or
+/// is not there and cannot be made.
 void claim_folder(const std::filesystem::path& folder, const std::string& role);
 
 /// Announces that `file` is about to be read; `expected` is for messages ("a JSON file"). Throws InputError where there
@@ -43,6 +44,9 @@ class OwnOutputRead {
 /// The file that a write to `target` changes: symbolic links are followed, also to a file that does not exist. Throws
 /// InputError where they lead to each other.
 std::filesystem::path link_target(std::filesystem::path target);
+
+/// The folder that a name is in, "." for one without.
+std::filesystem::path parent_folder(const std::filesystem::path& file);
 
 /// The current folder. Throws InputError where it was removed.
 std::filesystem::path current_folder();

@@ -13,4 +13,8 @@ inline constexpr std::array<std::string_view, 3> kNames<MaterialModel>{"stvk", "
 /// St.Venant-Kirchhoff and corotational, whose energies are positive definite in their strains down to it.
 double least_poisson_ratio(MaterialModel model);
 
+/// Poisson ratios of an object, bounds included, as schemas/asset.json has them: nearer to -1 and 0.5 stiffnesses
+/// against shear and against compression are so far apart that modes are not found.
+inline constexpr double kLeastPoissonRatio = -0.999, kMostPoissonRatio = 0.49999;
+
 }  // namespace exmat

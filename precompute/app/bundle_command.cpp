@@ -140,12 +140,14 @@ void check_files(const BundleOptions& options) {
   if (!options.depfile.empty()) precompute::depfile_text(options.bundle, {options.asset, options.scene});
 }
 
-/// Claims what depends on the asset, and names inputs that are read late.
+/// Claims what depends on the asset, and names inputs that are read late, or by another scene.
 void claim_outputs(const BundleOptions& options, const AssetConfig& asset, const std::optional<SceneConfig>& scene) {
   if (!options.alignment_report.empty()) precompute::claim_alignment_report(asset, options.alignment_report);
+  require_files(asset);
+  for (const NamedFile& named : named_files(asset)) check_input(named.file, named.kind);
   if (!scene) return;
   require_obstacle_files(*scene);
-  for (const ObstacleFile& named : obstacle_files(*scene)) check_input(named.file, named.kind);
+  for (const NamedFile& named : obstacle_files(*scene)) check_input(named.file, named.kind);
 }
 
 /// Sets `model` where it makes one.

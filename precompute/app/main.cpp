@@ -7,6 +7,7 @@
 
 #include "common/config/config.h"
 #include "common/console/console.h"
+#include "common/core/command_files.h"
 #include "common/core/log.h"
 #include "common/core/version.h"
 #include "common/hdf5/library_versions.h"
@@ -48,6 +49,7 @@ void print_alignments(const std::vector<precompute::AlignmentOutcome>& outcomes)
 
 void check(const CheckOptions& options) {
   precompute::BuildReport report;
+  if (!options.alignment_report.empty()) claim_folder(options.alignment_report, "--alignment-report");
   const AssetConfig asset = asset_from(options.asset);
   if (!options.alignment_report.empty()) precompute::claim_alignment_report(asset, options.alignment_report);
   const auto outcomes = precompute::check_inputs(asset, options.alignment_report, report);

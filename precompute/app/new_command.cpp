@@ -31,6 +31,7 @@ void new_command(const NewCommandOptions& options) {
   const std::filesystem::path folder = options.folder.empty() ? name : options.folder;
   const std::filesystem::path asset_file = folder / "asset.json", scene_file = folder / "scene.json";
   check_input(surface, "a surface");
+  claim_folder(folder, "-o");
   require_new(asset_file);
   require_new(scene_file);
   const Json asset = precompute::assumed_asset(surface, folder);

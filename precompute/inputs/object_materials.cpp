@@ -27,9 +27,12 @@ void require_poisson_ratios(const TetMaterials& materials, const AssetConfig& as
   const double least = least_poisson_ratio(materials.model);
   for (Eigen::Index t = 0; t < materials.poisson_ratio.size(); ++t) {
     const double ratio = materials.poisson_ratio[t];
-    if (ratio > least && ratio < 0.5) continue;
-    throw InputError({asset.file.string(), "/object/material",
-                      fmt::format("Poisson ratios above {} and below 0.5 for {}", least, name_of(materials.model)),
+    if (ratio > least && ratio >= kLeastPoissonRatio && ratio <= kMostPoissonRatio) continue;
+    throw InputError({asset.file.string(), "/object/material/poisson_ratio",
+                      fmt::format("Poisson ratios {} and at most {} for {}",
+                                  least < kLeastPoissonRatio ? fmt::format("of at least {}", kLeastPoissonRatio)
+                                                             : fmt::format("above {}", least),
+                                  kMostPoissonRatio, name_of(materials.model)),
                       fmt::format("{} in tet {}", ratio, t), "change it, or take another model"});
   }
 }

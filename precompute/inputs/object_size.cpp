@@ -1,10 +1,10 @@
 #include "precompute/inputs/object_size.h"
 
 #include <fmt/format.h>
-#include <limits>
 
 #include "common/core/error.h"
 #include "common/core/log.h"
+#include "common/core/number_limits.h"
 #include "common/mesh/geometry.h"
 
 namespace exmat::precompute {
@@ -12,7 +12,6 @@ namespace {
 
 constexpr double kUsualGravity = 9.81;  // [m/s^2]
 constexpr double kSoftest = 1e12;       // weight of a column as high as the body is long over Young's modulus, at most
-constexpr double kLostShare = 1e-9;     // of the length, by rounding: solvers ask for as much
 
 }  // namespace
 
@@ -36,8 +35,8 @@ std::string remark_on_size(const TetMesh& mesh, const TetMaterials& materials) {
         "the object is {:.3g} m long; is that its size in metres? If not, mend object.unit or object.scale of the "
         "asset (--write-asset FILE writes the asset of a surface)",
         length);
-  const double far = mesh.vertices.cwiseAbs().maxCoeff(), gap = far * std::numeric_limits<double>::epsilon();
-  if (gap > kLostShare * length)
+  const double far = mesh.vertices.cwiseAbs().maxCoeff();
+  if (const double gap = lost_detail(far, length); gap > 0)
     return fmt::format(
         "the object is {:.3g} m long and up to {:.3g} m from the origin, where numbers of 16 digits are {:.1g} m "
         "apart: finer detail is lost; move it to the origin, and place bodies by their scene",

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cinttypes>
-#include <cmath>
 #include <cstdint>
 #include <cstring>
 #include <vector>
 
+#include "common/core/number_limits.h"
 #include "runtime/api/failures.h"
 #include "runtime/api/settings.h"
 
@@ -29,14 +29,9 @@ inline exmat_status wrong_length(const char* function, const char* argument, std
 #define EXMAT_REQUIRE_LENGTH(length, expected) \
   if ((length) != static_cast<std::int64_t>(expected)) return wrong_length(__func__, #length, length, expected)
 
-/// Largest number in places [m], velocities [m/s], gravity and coordinates that a caller gives: squares are finite,
-/// and places fit into single precision.
-inline constexpr double kFarthest = 1e30;
-
-/// The first of `count` numbers that is not finite or farther than that; null: none.
+/// The first of `count` numbers that is not finite or farther than kFarthest; null: none.
 inline const double* find_far(const double* numbers, std::int64_t count) {
-  const double* const far =
-      std::find_if(numbers, numbers + count, [](double number) { return !(std::abs(number) <= kFarthest); });
+  const double* const far = std::find_if_not(numbers, numbers + count, is_near);
   return far != numbers + count ? far : nullptr;
 }
 

@@ -31,7 +31,11 @@ void check_weights(std::span<const double> weights, Eigen::Index examples) {
     throw InvalidArgument(fmt::format("weights: their sum is {:g}: expected 1", sum));
 }
 
-bool is_factor(double number) { return number >= 0 && std::isfinite(number); }
+exmat_status require_factor(const char* function, const char* name, double number) noexcept {
+  if (number >= 0 && number <= kFarthest) return EXMAT_OK;
+  return fail(EXMAT_INVALID_ARGUMENT, "%s: %s = %g: expected a number >= 0, of at most %g", function, name, number,
+              kFarthest);
+}
 
 }  // namespace
 
@@ -67,8 +71,7 @@ exmat_status exmat_body_set_gravity(exmat_body* body, const double* gravity) noe
 exmat_status exmat_body_set_damping(exmat_body* body, double alpha, double beta) noexcept {
   EXMAT_REQUIRE(body);
   for (const auto& [name, factor] : {std::pair("alpha", alpha), std::pair("beta", beta)})
-    if (!is_factor(factor))
-      return fail(EXMAT_INVALID_ARGUMENT, "%s: %s = %g: expected a finite number >= 0", __func__, name, factor);
+    if (const exmat_status status = require_factor(__func__, name, factor)) return status;
   body->scene.mass_damping = alpha;
   body->scene.stiffness_damping = beta;
   return EXMAT_OK;
@@ -113,15 +116,13 @@ std::int32_t exmat_body_space(const exmat_body* body) noexcept {
 
 exmat_status exmat_body_set_example_stiffness(exmat_body* body, std::int64_t region, double kappa) noexcept {
   EXMAT_REQUIRE(body);
-  if (!is_factor(kappa))
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: kappa = %g: expected a finite number >= 0", __func__, kappa);
+  if (const exmat_status status = require_factor(__func__, "kappa", kappa)) return status;
   return guarded(__func__, [&] { example_settings(*body, region).stiffness = kappa; });
 }
 
 exmat_status exmat_body_set_example_damping(exmat_body* body, std::int64_t region, double c_kappa) noexcept {
   EXMAT_REQUIRE(body);
-  if (!is_factor(c_kappa))
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: c_kappa = %g: expected a finite number >= 0", __func__, c_kappa);
+  if (const exmat_status status = require_factor(__func__, "c_kappa", c_kappa)) return status;
   return guarded(__func__, [&] { example_settings(*body, region).damping = c_kappa; });
 }
 

@@ -34,8 +34,7 @@ exmat_contact_law own_law() noexcept {
 
 void require_law(const exmat_contact_law& given) {
   const auto is_positive = [](double number) { return number > 0 && std::isfinite(number); };
-  if (!is_positive(given.stiffness))
-    throw InvalidArgument(fmt::format("law.stiffness = {:g}: expected a finite number above 0", given.stiffness));
+  contact_stiffness(given.stiffness, "law.stiffness");
   if (!is_positive(given.release))
     throw InvalidArgument(fmt::format("law.release = {:g}: expected a finite number above 0", given.release));
   for (const auto& [number, name] : {std::pair(given.damping, "damping"), std::pair(given.friction, "friction")})
@@ -57,6 +56,14 @@ exmat_world::~exmat_world() {
 }
 
 namespace exmat::runtime {
+
+double contact_stiffness(double number, const char* name) {
+  constexpr double kStiffest = 1e15;  // [N/m^3]
+  if (number > 0 && number <= kStiffest) return number;
+  throw InvalidArgument(
+      fmt::format("{} = {:g}: expected a number above 0, of at most {:g}; steel that is 1 mm thick has 2e14 N/m^3",
+                  name, number, kStiffest));
+}
 
 ContactLaw contact_law_of(const exmat_contact_law& law) noexcept {
   return {law.stiffness, law.damping, law.friction, law.release};

@@ -52,6 +52,10 @@ namespace exmat::runtime {
 
 ContactLaw contact_law_of(const exmat_contact_law& law) noexcept;
 
+/// The stiffness of contacts. Throws InvalidArgument where it is none, or beyond what schemas/scene.json allows; `name`
+/// is for messages.
+double contact_stiffness(double number, const char* name);
+
 /// A body's place among the members of its world.
 int place_of(const exmat_body& body) noexcept;
 

@@ -42,12 +42,6 @@ double length_of(double number, const char* name) {
   return number;
 }
 
-double positive(double number, const char* name) {
-  if (!(number > 0 && std::isfinite(number)))
-    throw InvalidArgument(fmt::format("obstacle.{} = {:g}: expected a finite number above 0", name, number));
-  return number;
-}
-
 double not_negative(double number, const char* name) {
   if (!(number >= 0 && std::isfinite(number)))
     throw InvalidArgument(fmt::format("obstacle.{} = {:g}: expected a finite number >= 0", name, number));
@@ -95,7 +89,7 @@ MeetingGroup meeting_of(const exmat_obstacle& given) {
 }
 
 void set_law(double stiffness, double damping, double friction, Obstacle& obstacle) {
-  obstacle.stiffness = positive(stiffness, "stiffness");
+  obstacle.stiffness = contact_stiffness(stiffness, "obstacle.stiffness");
   obstacle.damping = not_negative(damping, "damping");
   obstacle.friction = not_negative(friction, "friction");
 }

@@ -1,10 +1,12 @@
 #include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
 
 #include "common/config/config.h"
 #include "common/core/command_files.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
+#include "common/core/number_limits.h"
 #include "common/hdf5/xdmf.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/loading_log.h"
@@ -123,6 +125,40 @@ void warn_of_steps(const RunSummary& summary, const WorldConfig& config) {
         summary.unconverged_steps, summary.steps * summary.bodies, config.bodies.front().scene.newton.tolerance));
 }
 
+/// The length of a bar of its mass and inertia, if it has any, else that of the surface that may touch; where neither
+/// is known a metre [m].
+double length_of(const Model& model) {
+  if (const DeformingInertia* const inertia = model.frame->inertia_of_momenta()) {
+    DeformingInertia::Moments moments = inertia->make_moments();
+    inertia->moments(Eigen::VectorXd::Zero(inertia->modes()), moments);
+    return std::sqrt(6 * moments.inertia.trace() / inertia->mass());
+  }
+  return model.contact ? 2 * model.contact->reach() : 1;
+}
+
+/// Of the farthest body that begins where numbers do not hold its shape.
+void warn_of_places(const LoadedWorld& loaded) {
+  std::vector<double> lengths;
+  for (const LoadedKind& kind : loaded.kinds) lengths.push_back(length_of(*kind.loaded.model));
+  int farthest = -1;
+  double far = 0, gap = 0;
+  for (std::size_t i = 0; i < loaded.bodies.size(); ++i) {
+    const LoadedBody& body = loaded.bodies[i];
+    const LoadedScene& kind = loaded.kinds[body.kind].loaded;
+    const Eigen::Vector3d start = kind.model->frame->placement(kind.start.frame).position + body.place.position;
+    const double own = start.cwiseAbs().maxCoeff(), lost = lost_detail(own, lengths[body.kind]);
+    if (lost == 0 || own <= far) continue;
+    farthest = static_cast<int>(i);
+    far = own;
+    gap = lost;
+  }
+  if (farthest >= 0)
+    log::warning(fmt::format(
+        "{} starts {:.3g} m from the origin, where numbers of 16 digits are {:.1g} m apart: finer detail of its shape "
+        "is lost; move the scene to the origin",
+        body_name(loaded, farthest), far, gap));
+}
+
 void warn_of_overlap(const RunSummary& summary, const LoadedWorld& loaded, const WorldConfig& config) {
   if (!summary.overlap) return;
   const auto name_of = [&](int body) { return body_name(loaded, body); };
@@ -144,6 +180,7 @@ void run_command(const RunCommandOptions& options) {
   claim_outputs(config, options);
   const LoadedWorld loaded = load_world_run(config);
   log_loaded(loaded, config);
+  warn_of_places(loaded);
   RunOptions run_options = options.run;
   run_options.keeps_contacts = true;
   const RunSummary summary = run(loaded, config, run_options);

@@ -13,6 +13,7 @@
 #include "runtime/scene/attachment_loader.h"
 #include "runtime/scene/contact_load.h"
 #include "runtime/scene/state_file.h"
+#include "runtime/sim/step/contact_step.h"
 
 namespace exmat::runtime {
 namespace {
@@ -184,23 +185,48 @@ RunSummary empty_summary(const WorldConfig& config, const Bodies& bodies, bool p
   return summary;
 }
 
-/// After the first step: the deepest of what it has begun to let out, if any. `step` is what it let out [m].
-std::optional<StartOverlap> start_overlap(const World& world, double step) {
-  std::optional<StartOverlap> deepest;
-  const auto add = [&](const StartOverlap& found) {
-    if (found.depth > step && (!deepest || found.depth > deepest->depth)) deepest = found;
-  };
+void keep_deeper(const StartOverlap& found, double least, std::optional<StartOverlap>& deepest) {
+  if (found.depth > least && (!deepest || found.depth > deepest->depth)) deepest = found;
+}
+
+/// Before the first step: vertices deeper than `least` [m] in obstacles, where these begin.
+void find_in_obstacles(World& world, double least, std::optional<StartOverlap>& deepest) {
   for (int body = 0; body < world.count(); ++body) {
-    const ContactState& contacts = world.state(body).contacts;
-    for (const HeldContact& held : std::span(contacts.held).first(contacts.count))
-      add({body, held.obstacle, true, world.model(body).contact->object_vertex(held.vertex), held.overlap + step});
+    const StepScene& scene = world.scene(body);
+    if (!touches(world.model(body), scene)) continue;
+    const ContactSet& set = *world.model(body).contact;
+    const BodyPose pose = pose_of(world.model(body), world.state(body));
+    ContactWorkspace& found = world.scratch(body).near->contact;
+    NearPlanes unknown(set.vertices(), set.modes(), scene.obstacles.size());
+    set.gather(scene.obstacles, world.state(body).time, 0, pose, 0, unknown, found);
+    for (const ContactCandidate& candidate : std::span(found.candidates).first(found.candidate_count)) {
+      const Eigen::Vector3d point = pose.position + set.world_arm(candidate.vertex, pose);
+      const double gap =
+          found.obstacles[static_cast<std::size_t>(candidate.obstacle)].nearest_surface_point(point).distance;
+      keep_deeper({body, candidate.obstacle, true, set.object_vertex(candidate.vertex), -gap}, least, deepest);
+    }
   }
+}
+
+/// After the first step: vertices in other bodies of which it has begun to let out `step` [m].
+void find_in_bodies(const World& world, double step, std::optional<StartOverlap>& deepest) {
   for (const HeldPair& pair : world.held())
     for (const int side : {0, 1})
       for (const HeldBodyContact& held : pair.held[static_cast<std::size_t>(side)]) {
         const int body = side == 0 ? pair.first : pair.second, other = side == 0 ? pair.second : pair.first;
-        add({body, other, false, world.model(body).contact->object_vertex(held.vertex), held.overlap + step});
+        const int vertex = world.model(body).contact->object_vertex(held.vertex);
+        keep_deeper({body, other, false, vertex, held.overlap + step}, step, deepest);
       }
+}
+
+/// The deepest of what overlaps at the start, if any: by a step of its own at kRelease, where the scene lets out
+/// faster, for that may leave nothing to be found after the first one.
+std::optional<StartOverlap> overlap_of_fast_release(const LoadedWorld& loaded, WorldConfig config) {
+  config.contact.release = kRelease;
+  Bodies bodies(loaded, config);
+  std::optional<StartOverlap> deepest;
+  bodies.step();
+  find_in_bodies(bodies.world(), config.time_step * kRelease, deepest);
   return deepest;
 }
 
@@ -211,6 +237,11 @@ RunSummary run(const LoadedWorld& loaded, const WorldConfig& config, const RunOp
   World& world = bodies.world();
   if (options.from_state) bodies.take_up(read_state(*options.from_state, loaded, config));
   RunSummary summary = empty_summary(config, bodies, options.profiled);
+  const bool is_fast = config.contact.release > kRelease;
+  if (!options.from_state) {
+    if (is_fast) summary.overlap = overlap_of_fast_release(loaded, config);
+    find_in_obstacles(world, config.time_step * std::min(config.contact.release, kRelease), summary.overlap);
+  }
   const auto trajectory = open_trajectory(loaded, config);
   const auto append = [&](double seconds) {
     for (std::size_t i = 0; i < trajectory->bodies(); ++i) {
@@ -235,8 +266,8 @@ RunSummary run(const LoadedWorld& loaded, const WorldConfig& config, const RunOp
     if (options.keeps_contacts) contacts.add_touches();
     add(report, world, seconds, summary);
     breaks.find(summary.broken);
-    if (summary.steps == 1 && !options.from_state)
-      summary.overlap = start_overlap(world, config.time_step * config.contact.release);
+    if (summary.steps == 1 && !options.from_state && !is_fast)
+      find_in_bodies(world, config.time_step * config.contact.release, summary.overlap);
     const Timer output;
     const bool written = trajectory && summary.steps % config.every == 0;
     if (written) append(seconds / world.count());

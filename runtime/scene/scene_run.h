@@ -27,7 +27,7 @@ struct StageSamples {
   std::array<Samples, kWorldStageNames.size()> of_world;  ///< on the wall clock
 };
 
-/// A vertex that begins inside an obstacle or another body, deeper than one step lets out.
+/// A vertex that begins inside an obstacle or another body, deeper than one step lets out at kRelease.
 struct StartOverlap {
   int body = 0, other = 0;  ///< numbers in the world; `other` of the obstacles that the body meets, if it is one
   bool is_obstacle = false;

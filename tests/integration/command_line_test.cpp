@@ -15,7 +15,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::StartsWith;
 
-constexpr int kDone = 0, kFailure = 1, kBadInput = 2;
+constexpr int kDone = 0, kBadInput = 2;
 
 std::vector<std::string> lines(const std::string& text) {
   std::vector<std::string> lines;
@@ -130,14 +130,14 @@ TEST_F(CommandLine, OutputsThatCannotBeWrittenAreNamed) {
   const auto before = folder_.names();
   const std::string missing = folder_.path("missing/bundle.h5"), folder = folder_.path("");
   expect_refused(bundle(asset, folder), kBadInput, {folder, "folder"});
-  expect_refused(bundle(asset, missing), kFailure, {missing, "no folder"});
+  expect_refused(bundle(asset, missing), kBadInput, {missing, "no folder"});
   EXPECT_EQ(folder_.names(), before);
 
   make_bundle();
   const auto scene = write_scene(folder_, {{"steps", 5}});
   const auto with_bundle = folder_.names();
   expect_refused(run(scene, {"-o", folder}), kBadInput, {folder, "folder"});
-  expect_refused(run(scene, {"-o", missing}), kFailure, {missing, "no folder"});
+  expect_refused(run(scene, {"-o", missing}), kBadInput, {missing, "no folder"});
   EXPECT_EQ(folder_.names(), with_bundle);
 }
 

@@ -98,6 +98,30 @@ class Commands(unittest.TestCase):
         (self.folder / "bar.glb").symlink_to("bar.h5")
         self.refused("export", "t.h5", "-o", "bar.glb", said=["-o"])
 
+    def test_files_that_an_asset_names_are_inputs_also_where_they_are_not_read(self):
+        """The scene has no examples, so that none is read."""
+        asset = json.loads((self.folder / "asset.json").read_text())
+        for name in ("rest.veg", "bent.veg"):
+            shutil.copy(self.folder / "bar.veg", self.folder / name)
+        (self.folder / "part.txt").write_text("1, 2\n")
+        asset |= {"examples": [{"name": "rest", "mesh": "rest.veg", "rest": True}, {"name": "bent", "mesh": "bent.veg"}],
+                  "regions": [{"name": "part", "vertices": {"file": "part.txt"}, "examples": ["bent"]}]}
+        write_json(self.folder / "examples.json", asset)
+        for name in ("rest.veg", "bent.veg", "part.txt"):
+            for outputs in (["-o", name], ["-o", "new.h5", "--report", name], ["-o", "new.h5", "--depfile", name]):
+                self.refused("bundle", "examples.json", "--scene", "scene.json", *outputs, said=[name, "does not read"])
+
+    def test_a_body_where_numbers_lose_its_shape_is_warned_of(self):
+        asset = json.loads((self.folder / "asset.json").read_text())
+        del asset["object"]["fixed"]
+        write_json(self.folder / "free.json", asset)
+        self.command("bundle", "free.json", "-o", "free.h5")
+        for place, said in ((4.5e15, "starts 4.5e+15 m from the origin"), (1e30, "starts 1e+30 m from the origin"), (100, "")):
+            write_json(self.folder / "far.json", {"bundle": "free.h5", "steps": 3, "body": {"position": [0, place, 0]}})
+            errors = self.command("run", "far.json")
+            self.assertEqual("from the origin" in errors, bool(said), errors)
+            self.assertIn(said, errors)
+
     def test_a_pack_steps_as_its_bundle(self):
         self.command("pack", "bar.h5", "-o", "whole.exmat")
         self.command("pack", "bar.h5", "-o", "least.exmat", "--scene", "scene.json")
@@ -152,6 +176,26 @@ class Commands(unittest.TestCase):
         for words in (["bundle", "asset.json", "-o", "new.h5", "--cache", "bar.veg"], ["bundle", "asset.json", "-o", "new.h5", "--alignment-report", "bar.veg"],
                       ["study", "study.json", "-o", "bar.veg"], ["study", "--stability", "scene.json", "-o", "scene.json"]):
             self.refused(*words, said=[words[-2], "expected a folder"])
+
+    def test_outputs_have_a_folder_before_any_work(self):
+        """Runs of as many steps would not end."""
+        write_json(self.folder / "long.json", {"bundle": "bar.h5", "steps": 10 ** 12})
+        (self.folder / "dangling.h5").symlink_to("nodir/x.h5")
+        bundle = ["bundle", "asset.json", "-o", "new.h5"]
+        for name in ("nodir/x.h5", "dangling.h5", "asset.json/x.h5"):
+            for words in (["run", "long.json", "-o", name], ["run", "long.json", "--dump-state", name], ["full-space", "long.json", "-o", name],
+                          ["bundle", "asset.json", "-o", name], ["mesh", "surface.obj", "-o", name], ["pack", "bar.h5", "-o", name],
+                          ["export", "bar.h5", "-o", name], [*bundle, "--report", name], [*bundle, "--depfile", name],
+                          ["bundle", "surface.obj", "-o", "new.h5", "--write-asset", name]):
+                self.refused(*words, said=[words[-2], "expected a name in a folder that exists, found no folder"])
+        for option in ("-o", "--dump-state"):
+            self.refused("run", "long.json", option, "new.h5/", said=[option, "found the name of a folder"])
+        self.refused(*bundle, "--cache", "new.h5/", said=["--cache", "that of -o"])
+        for name in ("asset.json/x", "asset.json/x/y", "/proc/x"):
+            for words in ([*bundle, "--cache", name], [*bundle, "--alignment-report", name], ["check", "asset.json", "--alignment-report", name],
+                          ["study", "study.json", "-o", name], ["study", "--stability", "scene.json", "-o", name], ["new", "surface.obj", "-o", name]):
+                self.refused(*words, said=[words[-2], "expected a folder, or one that can be made"])
+        self.command(*bundle, "--cache", "some/new/folder/")
 
     def test_outputs_are_files(self):
         """Before any work: runs of as many steps would not end."""

@@ -33,6 +33,7 @@ SweepConfig read_sweep(const Json& json) {
 StudyConfig load_study(const std::filesystem::path& file) {
   const Json json = read_json(file);
   check_against_schema(json, "study", file);
+  check_numbers(json, file);
   StudyConfig study;
   study.file = file;
   study.name = json["name"];

@@ -220,9 +220,9 @@ EXMAT_API exmat_status exmat_body_step(exmat_body* body, int64_t steps, exmat_re
 EXMAT_API exmat_status exmat_body_read_report(const exmat_body* body, exmat_report* report) EXMAT_NOEXCEPT;
 
 /* Adds `forces` [coordinates = 3k] [N] on the points, constant in the world, to those that act in every step from now
-   on. Points of another model and forces that are not finite are refused. A free body's forces act at where the points
-   are when this is called: their sum and their torque about the centre of mass stay in the world, what they do to the
-   shape turns with the body. Call it again as the body moves. */
+   on. Points of another model and forces that are not finite, or above 1e30, are refused. A free body's forces act at
+   where the points are when this is called: their sum and their torque about the centre of mass stay in the world, what
+   they do to the shape turns with the body. Call it again as the body moves. */
 EXMAT_API exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* points, const double* forces,
                                                int64_t coordinates) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_body_clear_forces(exmat_body* body) EXMAT_NOEXCEPT;
@@ -304,7 +304,7 @@ EXMAT_API double exmat_body_time(const exmat_body* body) EXMAT_NOEXCEPT;
 /* `gravity` [3], world [m/s^2]. */
 EXMAT_API exmat_status exmat_body_set_gravity(exmat_body* body, const double* gravity) EXMAT_NOEXCEPT;
 
-/* Rayleigh damping: alpha >= 0 [1/s] of the mass, beta >= 0 [s] of the stiffness. */
+/* Rayleigh damping: alpha >= 0 [1/s] of the mass, beta >= 0 [s] of the stiffness, at most 1e30. */
 EXMAT_API exmat_status exmat_body_set_damping(exmat_body* body, double alpha, double beta) EXMAT_NOEXCEPT;
 
 /* EXMAT_BDF2, ...; the next step takes nothing from the ones before but position and velocity. */
@@ -424,10 +424,10 @@ EXMAT_API exmat_status exmat_body_apply_impulses(exmat_body* body, const exmat_p
 /* Settings of the example force. `region`: -1 is the whole body, else as in exmat_body_read_region_weights(). The model
    has to have that example force: use_examples, or the scene. */
 
-/* kappa >= 0 [1/s^2]. */
+/* kappa >= 0, at most 1e30 [1/s^2]. */
 EXMAT_API exmat_status exmat_body_set_example_stiffness(exmat_body* body, int64_t region, double kappa) EXMAT_NOEXCEPT;
 
-/* c_kappa >= 0 [1/s]; not of an elastic force. */
+/* c_kappa >= 0, at most 1e30 [1/s]; not of an elastic force. */
 EXMAT_API exmat_status exmat_body_set_example_damping(exmat_body* body, int64_t region, double c_kappa) EXMAT_NOEXCEPT;
 
 /* In [0, 1]: factor on the weight of the rest pose. */

@@ -18,7 +18,7 @@ extern "C" {
 /* Law of the contact between bodies, all per area of their surfaces. */
 typedef struct exmat_contact_law {
   size_t size;      /* sizeof(exmat_contact_law) where the caller was compiled */
-  double stiffness; /* pressure per depth, > 0 [N/m^3]; 1e6 */
+  double stiffness; /* pressure per depth, > 0, at most 1e15 [N/m^3]; 1e6 */
   double damping;   /* pressure per approach velocity, >= 0 [N s/m^3]; 0 */
   double friction;  /* Coulomb's coefficient, >= 0; 0 */
   int32_t self;     /* 1: a body also touches itself; 0. Takes time for each body's model when it is added */
@@ -207,7 +207,7 @@ typedef struct exmat_obstacle {
   double half_extents[3]; /* of the box, > 0 [m]; 1 */
   double orientation[4];  /* of the box, or of those axes, a quaternion, w first; 1 0 0 0 */
   double radius;          /* of sphere and capsule, > 0 [m]; 1 */
-  double stiffness;       /* pressure per depth, > 0 [N/m^3]; 1e6 */
+  double stiffness;       /* pressure per depth, > 0, at most 1e15 [N/m^3]; 1e6 */
   double damping;         /* pressure per approach velocity, >= 0 [N s/m^3]; 0 */
   double friction;        /* Coulomb's coefficient, >= 0; 0 */
   int32_t shape;          /* EXMAT_PLANE */

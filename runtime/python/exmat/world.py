@@ -14,7 +14,7 @@ class World(_exmat.World):
     (use_contact, or a scene with obstacles) and have the same time step. It is a mapping of ids to bodies. A world is for
     one thread at a time.
 
-    stiffness      pressure per depth, > 0 [N/m^3]
+    stiffness      pressure per depth, > 0, at most 1e15 [N/m^3]
     damping        pressure per approach velocity, >= 0 [N s/m^3]
     friction       Coulomb's coefficient, >= 0
     self_contact   whether a body also touches itself; takes time for each model when its first body is added

@@ -130,6 +130,21 @@ TEST_F(WorldConfigTest, MistakesAreNamed) {
               HasSubstr("takes one of the bodies as a scene of its own"));
 }
 
+TEST_F(WorldConfigTest, BodiesAreAtMostAsManyAsAListMayHave) {
+  const auto grid = [](const char* counts) {
+    return std::string(R"({"name": "a", "bundle": "a.h5", "grid": {"spacing": [1, 1, 1], "counts": )") + counts + "}}";
+  };
+  const std::string one = R"(, {"name": "b", "bundle": "a.h5")";
+  write("p.txt", "0 0 1\n0 0 2\n");
+  EXPECT_EQ(failure_of(R"({"bodies": [)" + grid("[1000, 100, 1]") + "]}"), "");
+  EXPECT_THAT(failure_of(R"({"bodies": [)" + grid("[10000, 10000, 10000]") + "]}"),
+              HasSubstr("/bodies/0/grid/counts: expected at most 100000 bodies in a scene, found 1000000000000"));
+  EXPECT_THAT(failure_of(R"({"bodies": [)" + grid("[1000, 100, 1]") + one + "}]}"),
+              HasSubstr("/bodies/1: expected at most 100000 bodies in a scene, found 100001"));
+  EXPECT_THAT(failure_of(R"({"bodies": [)" + grid("[1000, 100, 1]") + one + R"(, "poses": "p.txt"}]})"),
+              HasSubstr("/bodies/1/poses: expected at most 100000 bodies in a scene, found 100002"));
+}
+
 TEST_F(WorldConfigTest, PosesAreLines) {
   const auto places = read_poses(write("p.txt", "# where\n\n1 2 3\r\n  0.5 0 -1 0 0.6 0 0.8  \n4 5 6"));
   ASSERT_EQ(places.size(), 3u);
@@ -141,7 +156,8 @@ TEST_F(WorldConfigTest, PosesAreLines) {
 TEST_F(WorldConfigTest, BadPosesAreRefusedWithTheirLine) {
   EXPECT_THAT(refused_poses("1 2 3\n1 2\n"), HasSubstr("line 2"));
   EXPECT_THAT(refused_poses("1 2 three\n"), HasSubstr("line 1"));
-  EXPECT_THAT(refused_poses("1 2 nan\n"), HasSubstr("finite"));
+  for (const char* const line : {"1 2 nan\n", "1 2 -1e31\n"})
+    EXPECT_THAT(refused_poses(line), HasSubstr("finite numbers of at most 1e+30"));
   EXPECT_THAT(refused_poses("1 2 3 1 1 0 0\n"), HasSubstr("length 1"));
   EXPECT_THAT(refused_poses("# nothing\n"), HasSubstr("a line for each body"));
 }

@@ -108,6 +108,23 @@ TEST(CommandFiles, AreForgottenWithTheCommandAndNoneOfAHost) {
   EXPECT_EQ(refusal_of_output(mesh), "");
 }
 
+TEST(CommandFiles, RefuseOutputsWithoutAFolder) {
+  const TemporaryFolder folder;
+  folder.write("file", "x");
+  std::filesystem::create_symlink("none/new", folder.path() / "dangling");
+  const CommandFiles files;
+  for (const char* name : {"none/new", "file/new", "dangling"})
+    EXPECT_THAT(refusal_of_output(folder.path() / name), HasSubstr("expected a name in a folder that exists")) << name;
+  EXPECT_THAT(refusal_of_output(folder.path() / "new/"), HasSubstr("found the name of a folder"));
+  for (const char* name : {"file/new", "file/new/deep"})
+    EXPECT_THAT(refusal_of([&] { claim_folder(folder.path() / name, "--cache"); }),
+                HasSubstr("--cache: expected a folder"));
+  EXPECT_EQ(refusal_of([&] { claim_folder(folder.path() / "new/deep/", "-o"); }), "");
+  EXPECT_FALSE(std::filesystem::exists(folder.path() / "new"));
+  EXPECT_EQ(refusal_of_output(folder.path() / "new/deep/page.html"), "") << "the command makes that folder";
+  EXPECT_THAT(refusal_of([&] { claim_folder(folder.path() / "new/deep", "--cache"); }), HasSubstr("that of -o"));
+}
+
 TEST(CheckInput, RefusesWhatIsNoFile) {
   const TemporaryFolder folder;
   ASSERT_EQ(mkfifo((folder.path() / "pipe").c_str(), 0600), 0);

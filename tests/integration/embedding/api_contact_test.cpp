@@ -366,6 +366,7 @@ TEST_F(ApiContactTest, WrongObstaclesAreRefusedInWords) {
   EXPECT_THAT(refused([](auto& o) { o.shape = 9; }), HasSubstr("obstacle.shape = 9: expected 0 to 3"));
   EXPECT_THAT(refused([](auto& o) { o.direction[2] = 0; }), HasSubstr("obstacle.direction"));
   EXPECT_THAT(refused([](auto& o) { o.stiffness = 0; }), HasSubstr("obstacle.stiffness = 0"));
+  EXPECT_THAT(refused([](auto& o) { o.stiffness = 1e16; }), HasSubstr("obstacle.stiffness = 1e+16: expected a number"));
   EXPECT_THAT(refused([](auto& o) { o.friction = -1; }), HasSubstr("obstacle.friction = -1"));
   EXPECT_THAT(refused([](auto& o) { o.point[0] = NAN; }), HasSubstr("obstacle.point"));
   EXPECT_THAT(refused([](auto& o) { o.shape = EXMAT_SPHERE, o.radius = -2; }), HasSubstr("obstacle.radius = -2"));

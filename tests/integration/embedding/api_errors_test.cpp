@@ -232,6 +232,11 @@ TEST_F(ApiTest, WrongArgumentsAreCodes) {
   EXPECT_EQ(exmat_body_apply_forces(b, points.get(), numbers.data(), 2), EXMAT_INVALID_ARGUMENT);
   EXPECT_EQ(exmat_body_apply_forces(b, points.get(), bad_numbers.data(), 6), EXMAT_INVALID_ARGUMENT);
   EXPECT_THAT(exmat_last_error(), HasSubstr("expected finite numbers"));
+  for (const exmat_status status : {exmat_body_set_damping(b, 1e31, 0), exmat_body_set_damping(b, 0, 1e31),
+                                    exmat_body_set_example_stiffness(b, -1, 1e31)}) {
+    EXPECT_EQ(status, EXMAT_INVALID_ARGUMENT);
+    EXPECT_THAT(exmat_last_error(), HasSubstr("1e+31: expected a number >= 0, of at most 1e+30"));
+  }
   EXPECT_EQ(exmat_body_apply_forces(b, foreign.get(), numbers.data(), 6), EXMAT_INVALID_ARGUMENT);
   EXPECT_EQ(exmat_body_apply_forces(b, all.get(), numbers.data(), 6), EXMAT_INVALID_ARGUMENT);
   EXPECT_THAT(exmat_last_error(), HasSubstr("can only be read"));

@@ -136,8 +136,16 @@ TEST_F(ObjectMaterials, APoissonRatioBeyondTheModelIsNamedWithItsTet) {
     EXPECT_NO_THROW(materials());
   }
   asset_.material.model = MaterialModel::kStableNeoHookean;
-  EXPECT_EQ(complaint().expected, "Poisson ratios above -0.8 and below 0.5 for stable_neo_hookean");
+  EXPECT_EQ(complaint().expected, "Poisson ratios above -0.8 and at most 0.49999 for stable_neo_hookean");
   EXPECT_EQ(complaint().found, "-0.85 in tet 4");
+}
+
+TEST_F(ObjectMaterials, APoissonRatioWithoutDigitsIsNamedWithItsTet) {
+  for (const double ratio : {-0.9999999999999999, 0.49999999999, 0.4999999999999999}) {
+    asset_.material_regions = {{IdSelection{{4}}, std::nullopt, ratio, std::nullopt}};
+    EXPECT_EQ(complaint().place, "/object/material/poisson_ratio");
+    EXPECT_EQ(complaint().expected, "Poisson ratios of at least -0.999 and at most 0.49999 for stvk");
+  }
 }
 
 }  // namespace

@@ -96,12 +96,8 @@ TEST_P(BodyStates, ABodyTakesItsOwnStateWhateverForceItHasBeenGiven) {
   const exmat::Model model = make(GetParam());
   exmat::Body body(model), other(model);
   const exmat::Points points = exmat::Points::vertices(model, std::vector<std::int64_t>{7});
-  try {
-    body.apply_forces(points, std::vector<double>{0, 1e100, -1e250});
-  } catch (
-      const exmat::Error&) {  // in all vertices they are bounded: by the same number, and a vertex has many of them
-    for (int i = 0; i < 3; ++i) body.apply_forces(points, std::vector<double>{0, 1e29, -1e30});
-  }
+  // Each is bounded by the same number as the state's, and a vertex has many of them.
+  for (int i = 0; i < 3; ++i) body.apply_forces(points, std::vector<double>{0, 1e29, -1e30});
   other.set_state(body.state());
   EXPECT_EQ(other.state(), body.state());
 }

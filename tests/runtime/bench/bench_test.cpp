@@ -148,7 +148,8 @@ TEST_F(BenchTest, StepsThatAreGivenAreTaken) {
 }
 
 TEST_F(BenchTest, ANonFiniteStepIsAFailure) {
-  const SceneConfig config = scene(", \"forces\": [{\"vertices\": {\"ids\": [15]}, \"force\": [0, 1e300, 0]}]");
+  SceneConfig config = scene(", \"forces\": [{\"vertices\": {\"ids\": [15]}, \"force\": [0, 1, 0]}]");
+  config.forces.front().force[1] = 1e300;
   const test::LoadedRun loaded(config);
   EXPECT_THROW(bench(loaded.world, loaded.config, {.seconds = 0.01}), WorkError);
 }

@@ -189,6 +189,9 @@ def test_settings_of_a_body_are_those_of_a_model(bundle):
         body.set_example_bias(2)
     with pytest.raises(exmat.InvalidArgument, match="c_kappa = -1"):
         body.set_example_damping(-1)
+    for call in (body.set_example_stiffness, body.set_example_damping):
+        with pytest.raises(exmat.InvalidArgument, match=r"kappa = 1e\+31: expected a number >= 0, of at most 1e\+30"):
+            call(1e31)
 
 
 def test_given_weights_and_stiffness_are_of_the_body_alone(bundle):

@@ -71,6 +71,37 @@ TEST_F(WorldRunTest, WritesAGroupForEachBodyAndRunsTheSameEachTime) {
   EXPECT_EQ(run(loaded, config).state_hash, summary.state_hash);
 }
 
+TEST_F(WorldRunTest, WhatOverlapsAtTheStartIsFoundHoweverFastItIsLetOut) {
+  for (const double release : {0.1, 1.0, 1e30}) {
+    WorldConfig config =
+        world(R"({"name": "block", "bundle": "free.h5", "grid": {"counts": [1, 1, 2], "spacing": [0, 0, 0.15]}})");
+    config.steps = 1;
+    config.contact.release = release;
+    const auto overlap = run(load_world_run(config), config).overlap;
+    ASSERT_TRUE(overlap) << release;
+    EXPECT_FALSE(overlap->is_obstacle);
+    EXPECT_NEAR(overlap->depth, 0.05, 1e-6) << release;
+  }
+}
+
+TEST_F(WorldRunTest, WhatBeginsInAnObstacleIsFoundHoweverFastThatGoes) {
+  for (const char* const motion : {"", R"(, "motion": [{"time": 0}, {"time": 1, "position": [1e5, 0, 0]}])"})
+    for (const double release : {0.1, 1.0, 1e30}) {
+      WorldConfig config = world(R"({"name": "block", "bundle": "free.h5"})",
+                                 R"(, "obstacles": [{"plane": {"point": [0, 0, -1], "normal": [0, 0, 1]}},
+                                                    {"plane": {"point": [0, 0, 0.05], "normal": [0, 0, 1]})" +
+                                     std::string(motion) + "}]");
+      config.steps = 1;
+      config.contact.release = release;
+      for (ObstacleConfig& obstacle : config.bodies.front().scene.obstacles) obstacle.stiffness = 1;
+      const auto overlap = run(load_world_run(config), config).overlap;
+      ASSERT_TRUE(overlap) << release << motion;
+      EXPECT_TRUE(overlap->is_obstacle);
+      EXPECT_EQ(overlap->other, 1);
+      EXPECT_NEAR(overlap->depth, 0.05, 1e-6) << release << motion;
+    }
+}
+
 TEST_F(WorldRunTest, ABodyWithFixedVerticesHasOnePlace) {
   const WorldConfig config =
       world(R"({"name": "shelf", "bundle": "clamped.h5", "grid": {"counts": [2, 1, 1], "spacing": [2, 0, 0]}})");
