@@ -35,6 +35,10 @@ constexpr std::array<Beginning, 14> kBeginnings{{{"\x89HDF", "an HDF5 file (a bu
                                                  {"solid", "an STL surface", ".stl"},
                                                  {"*VERTICES", "a .veg mesh", ".veg"}}};
 
+/// Extensions of meshes and surfaces that are read.
+constexpr std::array<std::string_view, 11> kRead{".glb", ".gltf", ".obj", ".ply",  ".stl", ".veg",
+                                                 ".msh", ".node", ".ele", ".mesh", ".vtk"};
+
 /// Files whose beginnings say nothing.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kExtensions{{{".obj", "an .obj surface"},
                                                                                     {".stl", "an STL surface"},
@@ -136,12 +140,12 @@ std::string_view kind_of_file(const std::filesystem::path& file, std::string_vie
 }
 
 void refuse_other_kind(const std::filesystem::path& file) {
+  const std::string extension = lower_extension(file);
   std::error_code ignored;
-  if (!std::filesystem::is_regular_file(file, ignored)) return;
+  if (std::ranges::find(kRead, extension) == kRead.end() || !std::filesystem::is_regular_file(file, ignored)) return;
   std::array<char, 32> bytes{};
   std::ifstream stream(file, std::ios::binary);
   stream.read(bytes.data(), bytes.size());
-  const std::string extension = lower_extension(file);
   const Beginning* known = beginning_of({bytes.data(), static_cast<std::size_t>(stream.gcount())});
   if (known == nullptr || known->extension == extension || (known->extension == ".glb" && extension == ".gltf")) return;
   const std::string_view way = second_of(kWays, known->extension);

@@ -18,7 +18,7 @@ std::string read_text_file(const std::filesystem::path& file, const std::string&
 /// Its extension decides where the bytes say nothing.
 std::string_view kind_of_file(const std::filesystem::path& file, std::string_view bytes);
 
-/// Refuses a file that begins as one of another kind than its extension says. What cannot be read passes.
+/// Refuses a mesh or a surface, by its extension, that begins as a file of another kind. What cannot be read passes.
 void refuse_other_kind(const std::filesystem::path& file);
 
 /// The kind of all that begins as a JSON object does.

@@ -82,8 +82,7 @@ TEST_F(ReadGltf, TakesNoBuffersOfOtherFolders) {
     EXPECT_THAT(complaint.expected, HasSubstr("in its folder")) << uri;
     const bool is_outside = *uri == '.' || *uri == '%' || *uri == '/';
     EXPECT_EQ(complaint.place, is_outside ? "/buffers/0/uri" : "") << uri;
-    if (is_outside)
-      EXPECT_THAT(complaint.advice, HasSubstr("files outside the folder of the model are not read")) << uri;
+    EXPECT_EQ(complaint.advice.starts_with("files outside the folder of the model are not read"), is_outside) << uri;
   }
 }
 

@@ -51,6 +51,7 @@ TEST(ReadMesh, SaysWhatAFileOfAnotherKindIs) {
   EXPECT_EQ(complaint_of_reading(folder.write("body.vtk", "$MeshFormat\n")).found, "a Gmsh mesh");
   EXPECT_THAT(complaint_of_reading(folder.write("a.veg", "\x89HDF\r\n")).advice, HasSubstr("is no mesh"));
   EXPECT_EQ(complaint_of([&] { read_surface_file(folder.write("a.obj", "solid a\n")); }).found, "an STL surface");
+  EXPECT_EQ(complaint_of_reading(folder.write("a.exmat", "exmatpk\n")).found, "'.exmat'");
 }
 
 TEST(ReadMesh, RefusesAnEmptyFile) {
