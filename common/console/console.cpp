@@ -139,8 +139,8 @@ std::string unknown_option(const CLI::App& app) {
   return {};
 }
 
-/// The parser's message, with all names of an option that is missing, and with the command or the option that a word
-/// may have meant.
+/// The parser's message, with what an option without a value is, with all names of an option that is missing, and with
+/// the command or the option that a word may have meant.
 std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
   std::string message = error.what();
   const auto commands = parts_of(app);
@@ -148,6 +148,9 @@ std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
                            dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
   if (is_of_words && (commands.empty() || !app.get_subcommands().empty()))
     if (const std::string unknown = unknown_option(app); !unknown.empty()) return unknown;
+  if (dynamic_cast<const CLI::ArgumentMismatch*>(&error) != nullptr && message.ends_with(" missing"))
+    return fmt::format("{}: expected {}, found none; give one, or leave the option out",
+                       message.substr(0, message.find(':')), message.ends_with(" TEXT missing") ? "a path" : "a value");
   for (const CLI::App* command : commands)
     for (const CLI::Option* option : command->get_options())
       if (message == option->get_name() + " is required") message = option->get_name(false, true) + " is required";
@@ -178,6 +181,15 @@ CLI::Validator number_between(double low, double high) {
   return {check, fmt::format("FLOAT in [{:g} - {:g}]", low, high)};
 }
 
+CLI::Validator whole_number_between(std::int64_t low, std::int64_t high) {
+  const auto check = [low, high](const std::string& text) {
+    std::int64_t value = 0;
+    if (CLI::detail::lexical_cast(text, value) && value >= low && value <= high) return std::string();
+    return fmt::format("expected a whole number from {} to {}, found '{}'", low, high, text);
+  };
+  return {check, fmt::format("INT in [{} - {}]", low, high)};
+}
+
 CLI::Validator positive_number() {
   return number_between(std::numeric_limits<double>::min(), std::numeric_limits<double>::max()).description("POSITIVE");
 }
@@ -187,7 +199,7 @@ void add_common_options(CLI::App& app, CommonOptions& options) {
   app.footer("Every command also takes --version, --threads, --log-level and --progress: see " + app.get_name() +
              " --help.");
   app.add_option("--threads", options.threads, "OpenMP threads; 0: all cores. Results do not depend on it")
-      ->check(CLI::Range(0, 4096))
+      ->check(whole_number_between(0, 4096))
       ->capture_default_str();
   app.add_option("--log-level", options.log_level, "debug, info, warning or error")
       ->check(CLI::IsMember({"debug", "info", "warning", "error"}))

@@ -17,21 +17,27 @@ namespace {
 
 bool is_text(char c) { return (c >= 0x20 && c < 0x7f) || c == '\t' || c == '\r' || c == '\n'; }
 
-constexpr std::array<std::pair<std::string_view, std::string_view>, 14> kBeginnings{
-    {{"\x89HDF", "an HDF5 file (a bundle or a trajectory?)"},
-     {"exmatpk\n", "a pack of a bundle"},
-     {"glTF", "a glTF file (.glb)"},
-     {"Kaydara FBX", "an FBX file"},
-     {"; FBX", "an FBX file"},
-     {"BLENDER", "a Blender file"},
-     {"PK\3\4", "a ZIP archive (.npz, .3mf or .usdz?)"},
-     {"\x93NUMPY", "a NumPy array"},
-     {"$MeshFormat", "a Gmsh mesh"},
-     {"# vtk", "a VTK file"},
-     {"MeshVersionFormatted", "a MEDIT mesh"},
-     {"ply", "a PLY surface"},
-     {"solid", "an STL surface"},
-     {"*VERTICES", "a .veg mesh"}}};
+struct Beginning {
+  std::string_view bytes, kind, extension;
+};
+constexpr std::array<Beginning, 14> kBeginnings{{{"\x89HDF", "an HDF5 file (a bundle or a trajectory?)", ".h5"},
+                                                 {"exmatpk\n", "a pack of a bundle", ".h5"},
+                                                 {"glTF", "a glTF file (.glb)", ".glb"},
+                                                 {"Kaydara FBX", "an FBX file", ".fbx"},
+                                                 {"; FBX", "an FBX file", ".fbx"},
+                                                 {"BLENDER", "a Blender file", ".blend"},
+                                                 {"PK\3\4", "a ZIP archive (.npz, .3mf or .usdz?)", ".npz"},
+                                                 {"\x93NUMPY", "a NumPy array", ".npy"},
+                                                 {"$MeshFormat", "a Gmsh mesh", ".msh"},
+                                                 {"# vtk DataFile", "a VTK file", ".vtk"},
+                                                 {"MeshVersionFormatted", "a MEDIT mesh", ".mesh"},
+                                                 {"ply", "a PLY surface", ".ply"},
+                                                 {"solid", "an STL surface", ".stl"},
+                                                 {"*VERTICES", "a .veg mesh", ".veg"}}};
+
+/// Extensions of meshes and surfaces that are read.
+constexpr std::array<std::string_view, 11> kRead{".glb", ".gltf", ".obj", ".ply",  ".stl", ".veg",
+                                                 ".msh", ".node", ".ele", ".mesh", ".vtk"};
 
 /// Files whose beginnings say nothing.
 constexpr std::array<std::pair<std::string_view, std::string_view>, 5> kExtensions{{{".obj", "an .obj surface"},
@@ -80,6 +86,13 @@ std::string_view second_of(std::span<const std::pair<std::string_view, std::stri
   return {};
 }
 
+/// Null where the bytes begin as no known kind.
+const Beginning* beginning_of(std::string_view bytes) {
+  const auto found =
+      std::ranges::find_if(kBeginnings, [&](const Beginning& one) { return bytes.starts_with(one.bytes); });
+  return found == kBeginnings.end() ? nullptr : &*found;
+}
+
 /// Name of the encoding, for iconv, of text that is not in UTF-8; empty where nothing says so.
 std::string utf16_of(std::string_view bytes) {
   const auto is_wide = [&](std::size_t at, std::size_t low) {
@@ -120,11 +133,24 @@ std::string read_text_file(const std::filesystem::path& file, const std::string&
 }
 
 std::string_view kind_of_file(const std::filesystem::path& file, std::string_view bytes) {
-  for (const auto& [beginning, kind] : kBeginnings)
-    if (bytes.starts_with(beginning)) return kind;
+  if (const Beginning* known = beginning_of(bytes)) return known->kind;
   const std::size_t first = bytes.find_first_not_of(" \t\r\n");
   if (first != std::string_view::npos && bytes[first] == '{') return kJson;
   return second_of(kExtensions, lower_extension(file));
+}
+
+void refuse_other_kind(const std::filesystem::path& file) {
+  const std::string extension = lower_extension(file);
+  std::error_code ignored;
+  if (std::ranges::find(kRead, extension) == kRead.end() || !std::filesystem::is_regular_file(file, ignored)) return;
+  std::array<char, 32> bytes{};
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(bytes.data(), bytes.size());
+  const Beginning* known = beginning_of({bytes.data(), static_cast<std::size_t>(stream.gcount())});
+  if (known == nullptr || known->extension == extension || (known->extension == ".glb" && extension == ".gltf")) return;
+  const std::string_view way = second_of(kWays, known->extension);
+  throw InputError({file.string(), "", "a " + extension + " file", std::string(known->kind),
+                    way.empty() ? "name it with the extension " + std::string(known->extension) : std::string(way)});
 }
 
 std::string lower_extension(const std::filesystem::path& file) {
@@ -136,10 +162,10 @@ std::string lower_extension(const std::filesystem::path& file) {
 
 std::string way_from(const std::filesystem::path& file) { return std::string(second_of(kWays, lower_extension(file))); }
 
-void refuse_extension(const std::filesystem::path& file, const std::string& expected) {
+void refuse_extension(const std::filesystem::path& file, const std::string& expected, const std::string& advice) {
   const std::string extension = lower_extension(file);
-  throw InputError(
-      {file.string(), "", expected, extension.empty() ? "no extension" : "'" + extension + "'", way_from(file)});
+  throw InputError({file.string(), "", expected, extension.empty() ? "no extension" : "'" + extension + "'",
+                    advice.empty() ? way_from(file) : advice});
 }
 
 }  // namespace exmat

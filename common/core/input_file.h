@@ -18,6 +18,9 @@ std::string read_text_file(const std::filesystem::path& file, const std::string&
 /// Its extension decides where the bytes say nothing.
 std::string_view kind_of_file(const std::filesystem::path& file, std::string_view bytes);
 
+/// Refuses a mesh or a surface, by its extension, that begins as a file of another kind. What cannot be read passes.
+void refuse_other_kind(const std::filesystem::path& file);
+
 /// The kind of all that begins as a JSON object does.
 inline constexpr std::string_view kJson = "a JSON file (a scene or an asset?)";
 
@@ -27,7 +30,8 @@ std::string lower_extension(const std::filesystem::path& file);
 /// Advice that turns a file of another kind, by its extension, into a mesh: "export it as .glb, ..."; empty: not known.
 std::string way_from(const std::filesystem::path& file);
 
-/// Refuses a file whose extension is none of those expected, with the way to one of them where it is known.
-[[noreturn]] void refuse_extension(const std::filesystem::path& file, const std::string& expected);
+/// Refuses a file whose extension is none of those expected, with `advice` or the way to one of them where it is known.
+[[noreturn]] void refuse_extension(const std::filesystem::path& file, const std::string& expected,
+                                   const std::string& advice = "");
 
 }  // namespace exmat

@@ -35,8 +35,9 @@ GlbParts parts_of_glb(const std::string& file, std::string_view bytes) {
   if (const auto version = cursor.read_binary<std::uint32_t>("the version"); version != kGlbVersion)
     cursor.fail("version 2", std::to_string(version), "export as glTF 2.0");
   const auto length = cursor.read_binary<std::uint32_t>("the length of the file");
-  if (length > bytes.size())
-    cursor.fail(fmt::format("a file of {} bytes", length), std::to_string(bytes.size()), "is the file cut off?");
+  if (length != bytes.size())
+    cursor.fail(fmt::format("a file of {} bytes", length), std::to_string(bytes.size()),
+                length > bytes.size() ? "is the file cut off?" : "is the file damaged?");
   GlbParts parts;
   for (std::size_t end = kGlbHeaderBytes; end + 8 <= length;) {
     const auto size = cursor.read_binary<std::uint32_t>("the length of a chunk");

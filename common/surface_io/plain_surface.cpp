@@ -8,6 +8,7 @@
 namespace exmat {
 
 SurfaceFile read_plain_surface(const std::filesystem::path& file) {
+  refuse_other_kind(file);
   const std::string extension = lower_extension(file);
   if (extension == ".obj") return read_obj(file);
   if (extension == ".ply") return read_ply(file);

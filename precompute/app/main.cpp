@@ -100,8 +100,8 @@ CLI::App& add_mesh(CLI::App& app, MeshCommandOptions& options) {
   CLI::App& command = *app.add_subcommand("mesh", "enclose a surface with tets, write these and what they are like");
   command.add_option("SURFACE", options.surface, "surface (.glb, .gltf, .obj, .ply, .stl)")->required();
   command.add_option("-o,--output", options.mesh, "mesh to write (Gmsh .msh)")->required();
-  auto* cells =
-      command.add_option("--cells", options.settings.cells, "about so many tets")->check(CLI::Range(50, 2000000));
+  auto* cells = command.add_option("--cells", options.settings.cells, "about so many tets")
+                    ->check(whole_number_between(50, 2000000));
   command.add_option("--cell-size", options.settings.cell_size, "radius of the sphere about a tet, at most [m]")
       ->check(positive_number())
       ->excludes(cells);
@@ -144,7 +144,7 @@ CLI::App& add_study(CLI::App& app, StudyCommandOptions& options) {
   command
       .add_option("--jobs", options.jobs,
                   "processes that run points; times are measured by one. With --stability runs at a time")
-      ->check(CLI::Range(1, 256))
+      ->check(whole_number_between(1, 256))
       ->capture_default_str();
   return command;
 }
@@ -155,7 +155,7 @@ CLI::App& add_full_space(CLI::App& app, FullSpaceCommandOptions& options) {
   command.add_option("SCENE", options.scene, "scene file (JSON), with its bundle")->required();
   command.add_option("-o,--output", options.trajectory, "trajectory to write (HDF5), and an .xdmf beside it")
       ->required();
-  const CLI::Range count_range(std::int64_t{1}, std::int64_t{1'000'000'000'000});
+  const CLI::Validator count_range = whole_number_between(1, 1'000'000'000'000);
   command.add_option("--steps", options.steps, "so many steps instead of the scene's")->check(count_range);
   command.add_option("--every", options.every, "write a frame every so many steps instead of the scene's")
       ->check(count_range);

@@ -6,6 +6,7 @@
 #include <map>
 #include <string_view>
 
+#include "common/console/console.h"
 #include "common/core/error.h"
 
 namespace exmat {
@@ -67,11 +68,12 @@ void add_solver_options(CLI::App& app, precompute::SolverSettings& settings) {
                                                  {"mixed", Eigensolver::kMixed},
                                                  {"gamg", Eigensolver::kGamg},
                                                  {"lobpcg", Eigensolver::kLobpcg}};
-  app.add_option("--eigensolver", settings.eigensolver,
-                 "direct (MUMPS), mixed (factors in single precision), with less memory gamg (multigrid) or lobpcg, or "
-                 "auto, which goes by the mesh; --eps-NAME VALUE and --st-NAME VALUE are passed on to SLEPc and PETSc")
-      ->transform(CLI::CheckedTransformer(names, CLI::ignore_case))
-      ->option_text("{auto,direct,mixed,gamg,lobpcg} [auto]");
+  CLI::Option& option = *app.add_option(
+      "--eigensolver", settings.eigensolver,
+      "direct (MUMPS), mixed (factors in single precision), with less memory gamg (multigrid) or lobpcg, or "
+      "auto, which goes by the mesh; --eps-NAME VALUE and --st-NAME VALUE are passed on to SLEPc and PETSc");
+  take_words(option, names);
+  option.option_text("{auto,direct,mixed,gamg,lobpcg} [auto]");
 }
 
 }  // namespace exmat

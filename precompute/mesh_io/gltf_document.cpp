@@ -29,6 +29,20 @@ struct Folder {
   }
 };
 
+constexpr const char* kBuffersInside = "a glTF file whose buffers are in it, in its folder or below that";
+constexpr const char* kExportGlb = "export as .glb, which holds all buffers";
+
+void require_inside(const std::string& file, const nlohmann::json& buffers, const Folder& folder) {
+  for (std::size_t i = 0; i < buffers.size(); ++i) {
+    const std::string uri = buffers[i].value("uri", "");
+    if (uri.empty() || uri.starts_with("data:") ||
+        folder.holds((folder.path / tinygltf::dlib::urldecode(uri)).string()))
+      continue;
+    throw InputError({file, fmt::format("/buffers/{}/uri", i), kBuffersInside, quote(uri),
+                      std::string("files outside the folder of the model are not read: ") + kExportGlb});
+  }
+}
+
 tinygltf::FsCallbacks callbacks(Folder& folder) {
   tinygltf::FsCallbacks result{};
   result.FileExists = [](const std::string& name, void* data) {
@@ -61,9 +75,8 @@ tinygltf::Model load(const std::string& file, const std::string& json, std::stri
                                          static_cast<unsigned>(glb.size()), folder.path.string());
   }
   if (!loaded)
-    throw InputError({file, "", "a glTF file whose buffers are in it, in its folder or below that",
-                      quote(trimmed(error)),
-                      buffer.empty() ? "export as .glb, which holds all buffers" : "export it again"});
+    throw InputError(
+        {file, "", kBuffersInside, quote(trimmed(error)), buffer.empty() ? kExportGlb : "export it again"});
   return model;
 }
 
@@ -78,9 +91,10 @@ GltfDocument read_gltf_document(const std::filesystem::path& file) {
   const auto buffer = parts.buffer.value_or(std::string_view{});
   GltfDocument document;
   document.json = parse_gltf(name, parts.json);
-  const std::string json = shapes_of_gltf(name, document.json, !buffer.empty()).dump();
+  const nlohmann::json shapes = shapes_of_gltf(name, document.json, !buffer.empty());
   Folder folder{file.parent_path().empty() ? "." : file.parent_path(), {file}};
-  document.model = load(name, json, buffer, folder);
+  require_inside(name, shapes.value("buffers", nlohmann::json::array()), folder);
+  document.model = load(name, shapes.dump(), buffer, folder);
   document.files = std::move(folder.files);
   document.bytes = bytes.size();
   for (const tinygltf::Buffer& one : document.model.buffers) document.bytes += one.data.size();

@@ -64,7 +64,13 @@ void finish_row(const FileLine& line, Fields& fields, int further) {
   for (int column = 0; column < further; ++column)
     if (fields.next().empty()) fail_at(line, fmt::format("{} further columns, as declared above", further), quote(""));
   const std::string_view extra = fields.next();
-  if (!extra.empty()) fail_at(line, "the end of the line", quote(extra));
+  if (extra.empty()) return;
+  // A number with a decimal comma is two fields of such a line.
+  Fields words(line.text, Fields::Separators::kBlanks);
+  for (auto word = words.next(); !word.empty(); word = words.next())
+    if (const auto advice = advice_for_number(word); !word.ends_with(',') && !advice.empty())
+      fail_at(line, "finite numbers", quote(word), advice);
+  fail_at(line, "the end of the line", quote(extra));
 }
 
 void MeshTables::read_vertices(CommentedLines& lines) {

@@ -15,6 +15,7 @@ namespace exmat::precompute {
 namespace {
 
 SurfaceFile read_as_it_is(const std::filesystem::path& file) {
+  refuse_other_kind(file);
   const std::string extension = lower_extension(file);
   if (extension == ".glb" || extension == ".gltf") return read_gltf(file);
   if (extension == ".obj") return read_obj(file);

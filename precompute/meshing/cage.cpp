@@ -54,6 +54,7 @@ struct UnitSurface {
 };
 
 UnitSurface unit_surface(const SurfaceMesh& surface, const std::string& name) {
+  require_extent(surface.vertices, name);
   UnitSurface unit;
   const Eigen::RowVector3d low = surface.vertices.colwise().minCoeff(), high = surface.vertices.colwise().maxCoeff();
   unit.centre = (low + high) / 2;
@@ -61,8 +62,6 @@ UnitSurface unit_surface(const SurfaceMesh& surface, const std::string& name) {
   const auto refuse = [&](const std::string& found) {
     throw InputError({name, "", "a surface: triangles that have an area", found, ""});
   };
-  if (!std::isnormal(unit.diagonal) || !std::isnormal(unit.diagonal * unit.diagonal * unit.diagonal))
-    refuse(fmt::format("a bounding box whose diagonal is {:.3g} m long", unit.diagonal));
   std::vector<std::int32_t> number(static_cast<std::size_t>(surface.vertices.rows()), -1), kept;
   std::vector<Eigen::RowVector3i> triangles;
   for (const auto& corners : surface.triangles.rowwise()) {

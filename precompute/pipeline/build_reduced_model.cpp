@@ -344,9 +344,9 @@ std::optional<Motions> Pipeline::train(const BodyStages& stages, const PlannedTr
         runs.snapshots.cols()));
     if (runs.skipped > 0)
       warn(report_.warnings,
-           fmt::format("training: {} of {} runs were left out, by --training-budget or since they did "
-                       "not stay finite",
-                       runs.skipped, runs.skipped + runs.segments));
+           fmt::format("training: {} of {} runs were left out, {}since they did not stay finite; {}", runs.skipped,
+                       runs.skipped + runs.segments, options_.training_budget > 0 ? "by --training-budget or " : "",
+                       "are the loads of the asset, or of the scene, too large?"));
     constexpr double kMoved = 1e-12;  // of the body's size: less is rounding
     const double least = kMoved * bounding_box_diagonal(object_.mesh.vertices);
     const double moved = runs.snapshots.size() > 0 ? runs.snapshots.cwiseAbs().maxCoeff() : 0;

@@ -12,6 +12,7 @@
 
 #include "common/core/decompositions.h"
 #include "common/core/error.h"
+#include "common/core/log.h"
 #include "common/core/progress.h"
 #include "precompute/solvers/davidson.h"
 #include "precompute/solvers/refinement.h"
@@ -226,8 +227,10 @@ class TeamProblem {
       return vectors;
     } catch (const WorkError& error) {
       if (solver_settings().options.empty()) throw;
+      log::debug(error.what());
       throw InputError({"command line", words_of_options(), "options by which the eigenpairs are found",
-                        std::string("none: ") + error.what(), "mend their values, or leave them out"});
+                        "values that the eigensolver refuses or fails with",
+                        "mend their values, or leave them out; --log-level debug says why"});
     }
   }
 

@@ -21,7 +21,7 @@ int main(int argc, char** argv) {
   run.add_option("scene", options.scene, "SCENE.json")->required();
   run.add_option("-o,--output", options.trajectory,
                  "Trajectory (HDF5; an .xdmf comes beside it), instead of the scene's");
-  const CLI::Range step_range(std::int64_t{1}, std::int64_t{1'000'000'000'000});
+  const CLI::Validator step_range = whole_number_between(1, 1'000'000'000'000);
   run.add_option("--steps", options.steps, "Number of steps, instead of the scene's")->check(step_range);
   run.add_flag("--profile", options.run.profiled, "Print the time of each stage");
   run.add_flag("--load-capacity", options.load_capacity,
@@ -46,19 +46,21 @@ int main(int argc, char** argv) {
   export_command.add_option("-o,--output", export_options.output, "File to write (.glb, .usda or .pc2)")->required();
   export_command.add_option("--bundle", export_options.bundle,
                             "Bundle whose modes become morph targets of a .glb, instead of the one that was stepped");
-  export_command.add_option("--body", export_options.body, "The body alone, of a trajectory of several");
+  export_command.add_option("--body", export_options.body, "The body alone, of a trajectory of several")
+      ->type_name("NAME");
   export_command
       .add_option("--targets", export_options.targets,
                   "Morph targets of a .glb, by principal components of the motion; default: one for each mode")
-      ->check(CLI::Range(std::int64_t{1}, std::int64_t{1'000'000}));
+      ->check(whole_number_between(1, 1'000'000));
   export_command.add_flag("--mesh", export_options.mesh, "The tet mesh, also where there is a render mesh");
   export_command
       .add_option("--frame-rate", export_options.frame_rate,
                   "Frames a second of the animation; default: 24 of a .usda, of a .pc2 a sample is a frame")
       ->check(number_between(1e-3, 1e6));
   const std::map<std::string, runtime::UpAxis> axes{{"y", runtime::UpAxis::kY}, {"z", runtime::UpAxis::kZ}};
-  export_command.add_option("--up", export_options.up, "Axis of the object that points up, y (default) or z")
-      ->transform(CLI::CheckedTransformer(axes, CLI::ignore_case));
+  take_words(
+      *export_command.add_option("--up", export_options.up, "Axis of the object that points up, y (default) or z"),
+      axes);
 
   runtime::PackOptions pack_options;
   CLI::App& pack = *app.add_subcommand("pack", "Write what runs need of a bundle as one block of memory, without HDF5");

@@ -7,6 +7,7 @@
 #include <limits>
 #include <numeric>
 #include <span>
+#include <string_view>
 
 #include "common/bundle/file_schemas.h"
 #include "common/core/error.h"
@@ -15,6 +16,8 @@
 
 namespace exmat::runtime {
 namespace {
+
+constexpr double kLatest = 1e30;  // [s]: single precision, as glTF and point caches have it, holds times and time codes
 
 Hdf5File open(const std::filesystem::path& trajectory) {
   Hdf5File file = Hdf5File::open(trajectory);
@@ -41,7 +44,9 @@ void resize(Array& array, const std::vector<std::int64_t>& sizes) {
 
 }  // namespace
 
-TrajectoryReader::TrajectoryReader(const std::filesystem::path& trajectory) : file_(open(trajectory)) {}
+TrajectoryReader::TrajectoryReader(const std::filesystem::path& trajectory) : file_(open(trajectory)) {
+  if (bodies().empty()) check_motion();
+}
 
 std::vector<std::string> TrajectoryReader::bodies() const {
   return file_.has_group("/bodies") ? file_.list("/bodies") : std::vector<std::string>{};
@@ -59,6 +64,26 @@ void TrajectoryReader::select(const std::string& body) {
   }
   group_ = fill_name("/bodies/{body}", kBodyPlaceholder, body);
   sizes_ = {};
+  positions_.clear();
+  if (checked_.insert(body).second) check_motion();
+}
+
+void TrajectoryReader::check_motion() {
+  for (const char* path : {"/time", "/reduced", "/body/position", "/body/orientation", "/bones"}) {
+    if (!has(path)) continue;
+    const RowMatrix rows = read(path);
+    if (path != std::string_view("/time") || rows(rows.size() - 1) <= kLatest) continue;
+    refuse(group_ + path, fmt::format("times of at most {:g} s", kLatest), fmt::format("{:g} s", rows(rows.size() - 1)),
+           "run the scene again");
+  }
+  origin();
+  for (const bool mesh : {true, false}) {
+    if (!has(mesh ? "/vertices" : "/render/vertices")) continue;
+    open_positions(mesh);
+    std::vector<float> frame;
+    for (std::int64_t sample = 0; sample < samples(); ++sample) read_next(frame);
+    check_sum();
+  }
   positions_.clear();
 }
 

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -13,7 +14,7 @@
 namespace exmat::runtime {
 
 /// A trajectory, read and checked: format, sizes, values, checksums. Each call throws InputError that names the file
-/// and the dataset.
+/// and the dataset. All that any format draws of a body is checked once, whatever is read of it later.
 class TrajectoryReader {
  public:
   explicit TrajectoryReader(const std::filesystem::path& trajectory);
@@ -54,12 +55,15 @@ class TrajectoryReader {
   template <typename Value>
   std::optional<Value> attribute(const std::string& name, const char* expected) const;
   Hdf5Dataset open_dataset(const std::string& path);
+  /// Of the body that is selected, all that any format draws: finite numbers, times, checksums.
+  void check_motion();
   void check_sum(const Hdf5Dataset& dataset, std::uint32_t crc) const;
   template <typename Array>
   void read_all(const std::string& path, Array& array);
 
   Hdf5File file_;
-  std::string group_;  ///< group of the body; empty: the root
+  std::set<std::string> checked_;  ///< bodies
+  std::string group_;              ///< group of the body; empty: the root
   SymbolSizes sizes_;
   std::vector<Hdf5Dataset> positions_;  ///< the open one
   std::string positions_path_;          ///< its path below the group

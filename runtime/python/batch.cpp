@@ -93,12 +93,12 @@ void take_stiffness(BatchObject& batch, const Numbers& kappa) {
     set_factor(body_of(batch, i), ExampleFactor::kStiffness, kappa.data()[kappa.ndim() > 0 ? i : 0], -1);
 }
 
-void take_weights(BatchObject& batch, const py::object& given) {
-  if (given.is_none()) {
+void take_weights(BatchObject& batch, const std::optional<Numbers>& given) {
+  if (!given) {
     for (const auto& [id, body] : batch.bodies) set_weights(*body, {}, -1);
     return;
   }
-  const auto rows = given.cast<Numbers>();
+  const Numbers& rows = *given;
   const auto width = static_cast<py::ssize_t>(batch.model->examples);
   if (rows.ndim() == 1)
     require_shape(rows, "weights", {width});

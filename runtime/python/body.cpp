@@ -43,7 +43,7 @@ void apply_impulses(BodyObject& body, const PointsObject& points, const Numbers&
   body.get().apply_impulses(points.points, read_span(impulses));
 }
 
-py::array_t<double> sensitivity(BodyObject& body, const PointsObject& points, const py::object& region) {
+py::array_t<double> sensitivity(BodyObject& body, const PointsObject& points, const RegionName& region) {
   const std::int64_t own = region_of(body.model->model, region);
   const std::size_t examples =
       own < 0 ? body.model->model.examples() : body.model->model.region_examples(static_cast<std::size_t>(own));
@@ -53,26 +53,31 @@ py::array_t<double> sensitivity(BodyObject& body, const PointsObject& points, co
   return matrix;
 }
 
-void reach(BodyObject& body, const PointsObject* points, const py::object& targets, const py::object& region,
-           const py::object& lowest, const py::object& highest, double change, double horizon) {
-  if (points == nullptr && targets.is_none()) return body.get().stop_reaching();
-  if (points == nullptr || targets.is_none())
+/// The numbers of an array of one dimension; none where there is no array.
+std::vector<double> row_of(const std::optional<Numbers>& numbers, const char* name) {
+  if (!numbers) return {};
+  require_shape(*numbers, name, {numbers->size()});
+  return {numbers->data(), numbers->data() + numbers->size()};
+}
+
+void reach(BodyObject& body, const PointsObject* points, const std::optional<Numbers>& targets,
+           const RegionName& region, const std::optional<Numbers>& lowest, const std::optional<Numbers>& highest,
+           double change, double horizon) {
+  if (points == nullptr && !targets) return body.get().stop_reaching();
+  if (points == nullptr || !targets)
     throw Error(EXMAT_INVALID_ARGUMENT, "points, targets: expected both, or neither to stop");
-  const auto places = targets.cast<Numbers>();
-  require_shape(places, "targets", {static_cast<py::ssize_t>(points->count), 3});
-  std::vector<double> least, most;
-  if (!lowest.is_none()) least = lowest.cast<std::vector<double>>();
-  if (!highest.is_none()) most = highest.cast<std::vector<double>>();
-  if (!lowest.is_none() && !highest.is_none() && least.size() != most.size())
+  require_shape(*targets, "targets", {static_cast<py::ssize_t>(points->count), 3});
+  const std::vector<double> least = row_of(lowest, "lowest"), most = row_of(highest, "highest");
+  if (lowest && highest && least.size() != most.size())
     throw Error(EXMAT_INVALID_ARGUMENT, "lowest, highest: expected as many numbers");
   exmat_reach settings = default_reach();
   settings.region = region_of(body.model->model, region);
   settings.change = change;
   settings.horizon = horizon;
-  if (!lowest.is_none()) settings.lowest = least.data();
-  if (!highest.is_none()) settings.highest = most.data();
+  if (lowest) settings.lowest = least.data();
+  if (highest) settings.highest = most.data();
   settings.examples = static_cast<std::int64_t>(std::max(least.size(), most.size()));
-  body.get().reach(points->points, read_span(places), settings);
+  body.get().reach(points->points, read_span(*targets), settings);
 }
 
 py::array positions(BodyObject& body, const PointsObject& points, const py::object& out) {
@@ -80,7 +85,7 @@ py::array positions(BodyObject& body, const PointsObject& points, const py::obje
 }
 
 py::array_t<double> region_weights(BodyObject& body, const std::string& name) {
-  const auto region = static_cast<std::size_t>(region_of(body.model->model, py::str(name)));
+  const auto region = static_cast<std::size_t>(region_of(body.model->model, name));
   py::array_t<double> weights(static_cast<py::ssize_t>(body.model->model.region_examples(region)));
   body.get().read_region_weights(region, span_of(weights));
   return weights;
@@ -93,11 +98,9 @@ void set_reduced(BodyObject& body, const Numbers& q, const Numbers& v) {
   body.get().set_reduced(read_span(q), read_span(v));
 }
 
-void take_weights(BodyObject& body, const py::object& weights, const py::object& region) {
-  std::vector<double> numbers;
-  if (!weights.is_none()) numbers = weights.cast<std::vector<double>>();
-  if (!weights.is_none() && numbers.empty())
-    throw Error(EXMAT_INVALID_ARGUMENT, "weights: expected one for each example");
+void take_weights(BodyObject& body, const std::optional<Numbers>& weights, const RegionName& region) {
+  const std::vector<double> numbers = row_of(weights, "weights");
+  if (weights && numbers.empty()) throw Error(EXMAT_INVALID_ARGUMENT, "weights: expected one for each example");
   set_weights(body, numbers, region_of(body.model->model, region));
 }
 
@@ -337,19 +340,19 @@ void bind_settings(BodyClass& type) {
           "The bones at the end of the last step: shape (b, 3, 4), none of a body without a skeleton. A copy.")
       .def(
           "set_example_damping",
-          [](BodyObject& body, double c_kappa, const py::object& region) {
+          [](BodyObject& body, double c_kappa, const RegionName& region) {
             set_factor(body, ExampleFactor::kDamping, c_kappa, region_of(body.model->model, region));
           },
           py::arg("c_kappa"), py::arg("region") = py::none(), "c_kappa [1/s], likewise.")
       .def(
           "set_example_bias",
-          [](BodyObject& body, double bias, const py::object& region) {
+          [](BodyObject& body, double bias, const RegionName& region) {
             set_factor(body, ExampleFactor::kBias, bias, region_of(body.model->model, region));
           },
           py::arg("bias"), py::arg("region") = py::none(), "Factor in [0, 1] on the weight of the rest pose, likewise.")
       .def(
           "set_example_stiffness",
-          [](BodyObject& body, double kappa, const py::object& region) {
+          [](BodyObject& body, double kappa, const RegionName& region) {
             set_factor(body, ExampleFactor::kStiffness, kappa, region_of(body.model->model, region));
           },
           py::arg("kappa"), py::arg("region") = py::none(),

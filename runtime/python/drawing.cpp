@@ -55,7 +55,7 @@ py::array_t<double> placement(BodyObject& body) {
   return rows;
 }
 
-py::array_t<double> target(BodyObject& body, const py::object& region) {
+py::array_t<double> target(BodyObject& body, const RegionName& region) {
   py::array_t<double> q(static_cast<py::ssize_t>(body.model->modes));
   body.get().read_target(span_of(q), region_of(body.model->model, region));
   return q;

@@ -41,6 +41,18 @@ PyObject* call_in_words(PyObject* self, PyObject* arguments, PyObject* named) {
   return nullptr;
 }
 
+/// In place of a constructor where a class has none.
+int refuse_call(PyObject* self, PyObject* /*arguments*/, PyObject* /*named*/) {
+  try {
+    const auto name = py::type::of(py::handle(self)).attr("__name__");
+    const py::object words = py::module_::import("exmat.errors").attr("without_constructor")(name);
+    PyErr_SetObject(PyExc_TypeError, words.ptr());
+  } catch (py::error_already_set& other) {
+    other.restore();
+  }
+  return -1;
+}
+
 /// `value` may be a function of pybind11, which is alone in having a capsule for its self, or hold one.
 void speak(const py::object& value) {
   const py::object function = py::getattr(value, "__func__", value);
@@ -55,6 +67,10 @@ void speak(const py::object& value) {
 }  // namespace
 
 void speak_in_words(const py::handle& scope) {
+  if (PyType_Check(scope.ptr()) != 0) {
+    initproc& make = reinterpret_cast<PyTypeObject*>(scope.ptr())->tp_init;
+    if (make == py::detail::pybind11_object_init) make = refuse_call;
+  }
   for (const auto& [name, value] : py::dict(scope.attr("__dict__"))) {
     if (PyObject_IsInstance(value.ptr(), reinterpret_cast<PyObject*>(&PyProperty_Type)) == 1) {
       for (const char* part : {"fget", "fset"}) speak(value.attr(part));

@@ -116,7 +116,7 @@ std::shared_ptr<PointsObject> elements(const std::shared_ptr<ModelObject>& model
   return made(without_lock([&] { return Points::elements(model->model); }), model);
 }
 
-std::vector<std::string> example_names(const ModelObject& model, const py::object& region) {
+std::vector<std::string> example_names(const ModelObject& model, const RegionName& region) {
   const std::int64_t id = region_of(model.model, region);
   const std::size_t count = id < 0 ? model.examples : model.model.region_examples(static_cast<std::size_t>(id));
   std::vector<std::string> names;
@@ -124,7 +124,7 @@ std::vector<std::string> example_names(const ModelObject& model, const py::objec
   return names;
 }
 
-py::array_t<double> example_pose(const ModelObject& model, const std::string& example, const py::object& region) {
+py::array_t<double> example_pose(const ModelObject& model, const std::string& example, const RegionName& region) {
   const std::vector<std::string> names = example_names(model, region);
   const auto found = std::ranges::find(names, example);
   if (found == names.end())
@@ -191,12 +191,11 @@ void bind_points(py::module_& module) {
 
 }  // namespace
 
-std::int64_t region_of(const Model& model, const py::object& name) {
-  if (name.is_none()) return -1;
-  const auto wanted = name.cast<std::string>();
+std::int64_t region_of(const Model& model, const RegionName& name) {
+  if (!name) return -1;
   for (std::size_t i = 0; i < model.regions(); ++i)
-    if (model.region_name(i) == wanted) return static_cast<std::int64_t>(i);
-  throw Error(EXMAT_INVALID_ARGUMENT, ("region: the model has none that is named " + wanted).c_str());
+    if (model.region_name(i) == *name) return static_cast<std::int64_t>(i);
+  throw Error(EXMAT_INVALID_ARGUMENT, ("region: the model has none that is named " + *name).c_str());
 }
 
 void bind_model(py::module_& module) {

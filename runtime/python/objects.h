@@ -23,6 +23,7 @@ namespace exmat::python {
 namespace py = pybind11;
 
 using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
+using RegionName = std::optional<std::string>;
 using Ids = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;  ///< made by whole_numbers()
 
 /// r modes, K examples of the whole body.
@@ -245,7 +246,7 @@ void set_obstacles(const ObstacleAccess& to, const py::dict& kept);
 void set_obstacle_motions(const ObstacleAccess& to, const py::dict& kept);
 
 /// Number of the region of that name; -1, the whole body, where it is None.
-std::int64_t region_of(const Model& model, const py::object& name);
+std::int64_t region_of(const Model& model, const RegionName& name);
 
 /// A number that is one of `names`.
 std::int32_t number_of(const py::handle& value, const char* setting, const std::vector<const char*>& names);
@@ -338,14 +339,15 @@ using MadeCaster = CheckedCaster<Object, type_caster_base<Object>>;
 template <typename Object>
 using SharedCaster = CheckedCaster<Object, copyable_holder_caster<Object, std::shared_ptr<Object>>>;
 
-/// Refuses arrays of complex numbers, whose imaginary parts would be lost, and of texts.
+/// Refuses complex numbers, whose imaginary parts would be lost, and texts, in arrays and lists.
 template <>
 class type_caster<exmat::python::Numbers> : public pyobject_caster<exmat::python::Numbers> {
  public:
   bool load(handle source, bool convert) {
-    const bool is_array = isinstance<array>(source);
-    const char kind = is_array ? reinterpret_borrow<array>(source).dtype().kind() : 'f';
-    return std::string_view("biufO").find(kind) != std::string_view::npos && pyobject_caster::load(source, convert);
+    if (!convert) return pyobject_caster::load(source, false);  // an array of doubles or none
+    const auto given = array::ensure(source);
+    return given && std::string_view("biufO").find(given.dtype().kind()) != std::string_view::npos &&
+           pyobject_caster::load(given, true);
   }
 };
 

@@ -36,10 +36,9 @@ Shared of_text(const std::string& scene, const std::string& path) {
   return made([&] { return World::from_text(scene, path); });
 }
 
-std::uint64_t hash_of(const py::sequence& bodies) {
+std::uint64_t hash_of(const BodyList& bodies) {
   std::vector<exmat_body*> handles;
-  for (std::size_t i = 0; i < bodies.size(); ++i) {
-    const auto body = py::object(bodies[i]).cast<std::shared_ptr<BodyObject>>();
+  for (const auto& body : bodies) {
     if (!body) throw Error(EXMAT_INVALID_ARGUMENT, "bodies: expected bodies, found None");
     handles.push_back(body->get().get());
   }

@@ -59,7 +59,7 @@ class Commands(unittest.TestCase):
     def contents(self):
         return {path.name: path.read_bytes() for path in self.folder.rglob("*") if path.is_file()}
 
-    def refused(self, *words, said=()):
+    def refused(self, *words, said=(), unsaid=()):
         """The command ends with status 2, one message, and every file as it was."""
         before = self.contents()
         errors = self.command(*words, status=2)
@@ -68,6 +68,8 @@ class Commands(unittest.TestCase):
         self.assertEqual(len(messages), 1, errors)
         for text in said:
             self.assertIn(text, messages[0])
+        for text in unsaid:
+            self.assertNotIn(text, messages[0])
 
     def test_no_output_is_written_over_an_input(self):
         bundle = self.folder / "bar.h5"
@@ -209,9 +211,18 @@ class Commands(unittest.TestCase):
     def test_options_that_no_solver_takes_are_said(self):
         for option, value in (("--eps-max_it", "0"), ("--eps-tol", "nan"), ("--eps-ncv", "1"), ("--st-type", "foo"), ("--eps-nev", "x")):
             self.refused("bundle", "asset.json", "-o", "new.h5", option, value,
-                         said=[f"command line: {option.replace('_', '-')} {value}: expected options by which", "mend their values"])
+                         said=[f"command line: {option.replace('_', '-')} {value}: expected options by which", "mend their values"], unsaid=["PETSc", "http"])
         for kind in ("lapack", "foo", "ciss"):
             self.refused("bundle", "asset.json", "-o", "new.h5", "--eps-type", kind, said=["--eps-type: expected one of krylovschur", f"'{kind}'"])
+
+    def test_values_of_options_are_asked_for_in_words(self):
+        for option in ("--cache", "--depfile", "--report", "--scene"):
+            for word in (f"{option}=", option):
+                self.refused("bundle", "asset.json", "-o", "new.h5", word, said=[f"{option}: expected a path, found none; give one, or leave"])
+        self.refused("bundle", "asset.json", "-o", "new.h5", "--eigensolver", "x", said=["--eigensolver: x not in {auto,direct,gamg,lobpcg,mixed}"])
+        for value in ("1e3", "1.5", "x", "0", "-1"):
+            self.refused("run", "scene.json", "--steps", value, said=[f"--steps: expected a whole number from 1 to 1000000000000, found '{value}'"])
+        self.refused("run", "scene.json", "--steps=", said=["--steps: expected a value, found none"])
 
     def test_options_of_the_solvers_write_no_files(self):
         for option in ("--eps-view", "--eps-monitor", "--st-ksp-view", "--eps-view-values"):

@@ -13,6 +13,7 @@ import struct
 import sys
 import tempfile
 import unittest
+import zlib
 from pathlib import Path
 
 import h5py
@@ -469,6 +470,25 @@ class Export(unittest.TestCase):
         with h5py.File(damaged, "r+") as f:
             del f["reduced"]
         self.assertIn("export it as .usda or .pc2", self.refused("damaged.h5", "-o", "a.glb"))
+
+    def test_every_format_refuses_what_another_cannot_draw(self):
+        damaged = self.folder / "damaged.h5"
+
+        def refused_after(change, message):
+            damaged.write_bytes((self.folder / "free_run.h5").read_bytes())
+            with h5py.File(damaged, "r+") as f:
+                change(f)
+                for name in ("time", "vertices", "render/vertices", "reduced", "body/position", "body/orientation"):
+                    f[name].attrs["crc32"] = np.uint32(zlib.crc32(f[name][:].tobytes()))
+            for target in ("a.glb", "a.usda", "a.pc2"):
+                self.assertIn(message, self.refused("damaged.h5", "-o", target))
+
+        for name in ("vertices", "render/vertices", "reduced", "body/position", "body/orientation"):
+            def spoil(f, name=name):
+                f[name][3] = np.nan
+            refused_after(spoil, f"/{name}")
+        refused_after(lambda f: f.attrs.__setitem__("origin", [0, np.nan, 0]), "/@origin: expected three finite numbers")
+        refused_after(lambda f: f["time"].write_direct(f["time"][:] * 1e300), "/time: expected times of at most 1e+30 s, found 1e+300 s")
 
 
 if __name__ == "__main__":

@@ -21,7 +21,8 @@ int run(int argc, char** argv) {
   int jobs = 0;
   app.add_option("-o,--output", folder, "folder for stability.html, .md, .csv and .json")->required();
   app.add_flag("--quick", quick, "the cases of the test command alone, at most 600 steps each");
-  app.add_option("--jobs", jobs, "runs at a time; 0: as many as there are threads")->check(CLI::Range(0, 256));
+  app.add_option("--jobs", jobs, "runs at a time; 0: as many as there are threads")
+      ->check(exmat::whole_number_between(0, 256));
   return run_program(app, argc, argv, [&] {
     if (common.log_level == "info") common.log_level = "error";  // of hundreds of small bodies
     apply(common);

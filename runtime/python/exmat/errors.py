@@ -21,6 +21,16 @@ def in_words(text: str) -> str:
     return f"{name}{': ' if name else ''}expected {expected}, found {given}".replace("_exmat.", "")
 
 
+MAKERS = {"Shape": "Shape.plane(), sphere(), box(), capsule(), mesh() or height_field()", "State": "Body.state", "Report": "Body.step()",
+          "WorldState": "World.state", "WorldReport": "World.step()", "Energies": "energies", "ContactLaw": "contact_law",
+          "Obstacle": "obstacle()", "RayHit": "Body.cast_ray()"}
+
+
+def without_constructor(name: str) -> str:
+    """The text of the TypeError of a class that is called although it has no constructor."""
+    return f"{name}: expected one that exmat makes, found a call of the class; take that of {MAKERS.get(name, 'another object')}"
+
+
 class Error(Exception):
     """Something that exmat says; its text is the library's or the program's message."""
 

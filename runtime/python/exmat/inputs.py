@@ -1,5 +1,6 @@
 """Files for exmat-precompute from what a program has: members as dicts, meshes as arrays."""
 import json
+import math
 import os
 import pathlib
 from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple, Union
@@ -133,25 +134,27 @@ def _mesh_of_poses(examples: Any, given: Any) -> Optional[Tuple[Any, Any]]:
 
 
 def plain_members(value: Any) -> Any:
-    """As JSON has it: arrays as lists, paths absolute. Meshes in arrays are left out."""
+    """As JSON has it: arrays as lists, numbers finite, paths absolute. Meshes in arrays are left out."""
     try:
-        return _plain(value, "")
+        return _plain(value, "", "")
     except RecursionError:
         raise InvalidArgument(_TOO_DEEP) from None
 
 
-def _plain(value: Any, key: str) -> Any:
+def _plain(value: Any, key: str, place: str) -> Any:
     if isinstance(value, Mapping):
-        return {str(name): _plain(member, str(name)) for name, member in value.items()}
+        return {str(name): _plain(member, str(name), f"{place}/{name}") for name, member in value.items()}
     if isinstance(value, os.PathLike) or (isinstance(value, str) and key in PATHS):
         return os.path.abspath(value)
     if key in ("mesh", "surface", "render_mesh"):
         return None
     if isinstance(value, np.ndarray):
-        return value.tolist()
+        return _plain(value.tolist(), key, place)
     if isinstance(value, np.generic):
-        return value.item()
-    return [_plain(member, "") for member in value] if isinstance(value, (list, tuple)) else value
+        return _plain(value.item(), key, place)
+    if isinstance(value, float) and not math.isfinite(value):
+        raise InvalidArgument(f"{place}: expected a finite number, found {value}")
+    return [_plain(member, "", f"{place}/{index}") for index, member in enumerate(value)] if isinstance(value, (list, tuple)) else value
 
 
 def _write_json(path: pathlib.Path, members: Mapping[str, Any]) -> pathlib.Path:

@@ -45,18 +45,18 @@ int main(int argc, char** argv) {
   app.add_option("files", options.files, "SCENE.json or BUNDLE.h5, then bundles that are shown beside it")->required();
   app.add_option("--size", size, "Size of the picture in pixels, 1280x720");
   app.add_option("--scale", options.scale, "Scale of the interface; default: the screen's")
-      ->check(CLI::Range(0.5, 8.0));
+      ->check(number_between(0.5, 8.0));
   app.add_flag("--hide-interface", options.hide_interface, "Nothing but the scene; H brings the interface back");
   app.add_flag("--object", options.object_surface, "The surface of the tets, also where there is a render mesh");
   const std::string group = "Without a screen (with xvfb-run -a where there is none)";
   app.add_option("--script", options.script, "Do what this file says, at fixed time (schemas/viewer_script.json)")
       ->group(group);
   app.add_option("--frames", options.frames, "End after so many pictures")
-      ->check(CLI::Range(0, 10'000'000))
+      ->check(whole_number_between(0, 10'000'000))
       ->group(group);
   app.add_option("--frame-rate", options.frame_rate,
                  "Pictures a second of simulated time; default: the script's, or 60")
-      ->check(CLI::Range(1e-3, 1e6))
+      ->check(number_between(1e-3, 1e6))
       ->group(group);
   app.add_option("--record", options.record, "Folder for pictures (PNG), or a movie (.mp4 or .gif, by ffmpeg)")
       ->group(group);

@@ -75,9 +75,14 @@ TEST_F(ReadGltf, TakesBuffersOfTheTextAndOfFilesBelowItsFolder) {
 TEST_F(ReadGltf, TakesNoBuffersOfOtherFolders) {
   const GltfWriter writer = square();
   folder_.write("other.bin", writer.buffer());
-  for (const char* uri : {"../other.bin", "%2e%2e/other.bin", "none.bin", "/etc/passwd", "file:///etc/passwd"}) {
+  for (const char* uri :
+       {"../other.bin", "%2e%2e/other.bin", "none.bin", "/etc/passwd", "/dev/zero", "file:///etc/passwd"}) {
     const auto file = folder_.write("inner/a.gltf", writer.gltf(uri));
-    EXPECT_THAT(complaint_of([&] { read_gltf(file); }).expected, HasSubstr("in its folder")) << uri;
+    const Complaint complaint = complaint_of([&] { read_gltf(file); });
+    EXPECT_THAT(complaint.expected, HasSubstr("in its folder")) << uri;
+    const bool is_outside = *uri == '.' || *uri == '%' || *uri == '/';
+    EXPECT_EQ(complaint.place, is_outside ? "/buffers/0/uri" : "") << uri;
+    EXPECT_EQ(complaint.advice.starts_with("files outside the folder of the model are not read"), is_outside) << uri;
   }
 }
 
@@ -468,6 +473,10 @@ TEST_F(ReadGltf, RefusesDamagedContainers) {
   };
   EXPECT_EQ(refused(4, 1).expected, "version 2");
   EXPECT_THAT(refused(11, 1).expected, HasSubstr("bytes"));
+  const auto longer = folder_.write("longer.glb", whole + "tail");
+  const Complaint tail = complaint_of([&] { read_gltf(longer); });
+  EXPECT_EQ(tail.expected, "a file of " + std::to_string(whole.size()) + " bytes");
+  EXPECT_EQ(tail.found, std::to_string(whole.size() + 4));
   EXPECT_THAT(refused(15, 1).expected, HasSubstr("a chunk of"));
   EXPECT_EQ(refused(16, 'X').expected, "a chunk of JSON first");
   EXPECT_THAT(refused(0, 'X').expected, "JSON");

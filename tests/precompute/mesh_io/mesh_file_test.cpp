@@ -10,6 +10,7 @@
 #include <random>
 
 #include "common/mesh/checks.h"
+#include "precompute/mesh_io/surface_file.h"
 #include "tests/precompute/mesh_io/mesh_samples.h"
 
 namespace exmat::precompute {
@@ -28,6 +29,7 @@ TEST(ReadMesh, NamesTheKnownExtensions) {
   EXPECT_EQ(complaint.file, "body.stl");
   EXPECT_THAT(complaint.expected, HasSubstr(".mesh or .vtk"));
   EXPECT_EQ(complaint.found, "'.stl'");
+  EXPECT_THAT(complaint.advice, HasSubstr("it is a surface: name it by \"surface\""));
   EXPECT_EQ(complaint_of_reading("body").found, "no extension");
 }
 
@@ -37,6 +39,19 @@ TEST(ReadMesh, RefusesAMissingFileAndAFolder) {
   EXPECT_EQ(complaint_of_reading(folder.path("none.msh")).found, "no such file");
   std::filesystem::create_directory(folder.path("folder.veg"));
   EXPECT_EQ(complaint_of_reading(folder.path("folder.veg")).found, "a folder");
+}
+
+TEST(ReadMesh, SaysWhatAFileOfAnotherKindIs) {
+  const TemporaryFolder folder;
+  const auto vtk = folder.write("body.msh", "# vtk DataFile Version 3.0\nt\nASCII\n");
+  const Complaint complaint = complaint_of_reading(vtk);
+  EXPECT_EQ(complaint.expected, "a .msh file");
+  EXPECT_EQ(complaint.found, "a VTK file");
+  EXPECT_EQ(complaint.advice, "name it with the extension .vtk");
+  EXPECT_EQ(complaint_of_reading(folder.write("body.vtk", "$MeshFormat\n")).found, "a Gmsh mesh");
+  EXPECT_THAT(complaint_of_reading(folder.write("a.veg", "\x89HDF\r\n")).advice, HasSubstr("is no mesh"));
+  EXPECT_EQ(complaint_of([&] { read_surface_file(folder.write("a.obj", "solid a\n")); }).found, "an STL surface");
+  EXPECT_EQ(complaint_of_reading(folder.write("a.exmat", "exmatpk\n")).found, "'.exmat'");
 }
 
 TEST(ReadMesh, RefusesAnEmptyFile) {

@@ -359,7 +359,7 @@ constexpr std::array kMalformed{
               "the end of the file"},
     Malformed{"ObjEndsInAStatement", ".obj", "\\\n  -4\n", "-4 \\\n", "line 8", "a line after one that ends with '\\'",
               "the end of the file"},
-    Malformed{"PlyNotAPly", ".ply", "ply\n", "solid\n", "line 1", "'ply'", "'solid'"},
+    Malformed{"PlyNotAPly", ".ply", "ply\n", "stone\n", "line 1", "'ply'", "'stone'"},
     Malformed{"PlyUnknownFormat", ".ply", "ascii", "text", "line 2", "ascii, binary_little_endian", "'text'"},
     Malformed{"PlyOtherVersion", ".ply", "ascii 1.0", "ascii 2.0", "line 2", "version 1.0", "'2.0'"},
     Malformed{"PlyNoFormat", ".ply", "format ascii 1.0\n", "", "line 8", "a line 'format'", "none"},

@@ -55,6 +55,18 @@ TEST_F(ReadVeg, TakesEachWayToNameTets) {
     expect_two_tets(read(edited(two_tets(), "*ELEMENTS\nTET\n", heading)));
 }
 
+TEST_F(ReadVeg, RefusesDecimalCommas) {
+  for (const auto& text :
+       {edited(two_tets(), "\n5 1 1 1", "\n5 1 0,5 1"), edited(two_tets(), "\n5 1 1 1", "\n5 1 1 0,5"),
+        two_tets() + "*MATERIAL soft\nENU, 1000, 1e5, 0,5\n"}) {
+    const Complaint complaint = complaint_of([&] { read(text); });
+    EXPECT_EQ(complaint.found, "'0,5'");
+    EXPECT_EQ(complaint.advice, "write numbers with decimal points");
+  }
+  for (const char* row : {"5, 1, 1, 1, 7", "5,1,1,1,7"})
+    EXPECT_EQ(complaint_of([&] { read(edited(two_tets(), "5 1 1 1", row)); }).expected, "the end of the line");
+}
+
 TEST_F(ReadVeg, TakesCommasCommentsAndBlankLines) {
   expect_two_tets(
       read("# a comment\n\n  *VERTICES  # here\n5, 3, 0, 0\n1, 0, 0.0, 0e0\n\t2,+1,-0,0 # two\n3 0 1e0 0\n\n4 0 0 1.\n"

@@ -192,8 +192,14 @@ TEST(Cage, RefusesSurfacesWithoutAnExtent) {
   SurfaceMesh none = ball_surface(4, 1);
   none.triangles.col(1) = none.triangles.col(0);
   EXPECT_THAT(refusal(none, {}), HasSubstr("s.obj: expected a surface: triangles that have an area"));
-  none.vertices.setZero();
-  EXPECT_THAT(refusal(none, {}), HasSubstr("a bounding box whose diagonal is 0 m long"));
+  for (const double extent : {0.0, 1e-200, 1e308}) {
+    SurfaceMesh ball = ball_surface(4, 1);
+    ball.vertices *= extent;
+    EXPECT_THAT(refusal(ball, {}),
+                AllOf(HasSubstr("s.obj: vertices: expected a longest edge of the bounding box from "),
+                      HasSubstr("object.unit or object.scale")))
+        << extent;
+  }
 }
 
 TEST(Cage, RefusesCellsThatAreNoSizeForIt) {

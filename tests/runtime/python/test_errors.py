@@ -314,7 +314,8 @@ def test_complex_numbers_are_refused(model, body):
     points = exmat.Points(model, [0])
     imaginary = np.full((1, 3), 1j)
     for call in (lambda: body.apply_forces(points, imaginary), lambda: exmat.Points.at(model, imaginary), lambda: body.set_reduced(np.full(12, 1j), np.zeros(12)),
-                 lambda: exmat.Shape.height_field(np.full((2, 2), 1j), (1, 1)), lambda: body.set_reduced(np.full(12, "1"), np.zeros(12))):
+                 lambda: exmat.Shape.height_field(np.full((2, 2), 1j), (1, 1)), lambda: body.set_example_weights(np.array([1j, 1])),
+                 lambda: body.set_example_weights([np.complex128(1j), 1]), lambda: body.set_reduced(["1"] * 12, np.zeros(12)), lambda: body.set_reduced(np.full(12, "1"), np.zeros(12))):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
             with pytest.raises(TypeError, match="expected .*numpy.float64"):
@@ -335,6 +336,16 @@ def test_flags_are_true_or_false(model):
         with pytest.raises(exmat.InvalidArgument, match="_contact = .*: expected True or False"):
             call()
     assert exmat.World(self_contact=np.bool_(True)).contact_law.self_contact
+
+
+def test_numbers_that_are_not_finite_are_named_by_their_member(bundle):
+    for members, place in (({"gravity": [0, 0, np.nan]}, "/gravity/2"), ({"gravity": np.array([0, np.inf, 0])}, "/gravity/1"),
+                           ({"time": {"step": np.float32("nan")}}, "/time/step")):
+        for call in (exmat.Model.from_scene, exmat.World.from_scene):
+            with pytest.raises(exmat.InvalidArgument, match=f"^{place}: expected a finite number, found (nan|inf)$"):
+                call({"bundle": bundle, **members})
+    with pytest.raises(exmat.InvalidArgument, match="^/object/material/density: expected a finite number, found -inf$"):
+        exmat.precompute.check({"name": "x", "object": {"mesh": "a.msh", "material": {"density": -np.inf}}})
 
 
 def test_a_pose_of_other_vertices_is_named():
