@@ -154,9 +154,7 @@ void write_state(const BodiesMemory& memory, const LoadedWorld& loaded, const Wo
   for (std::size_t i = 0; i < loaded.bodies.size(); ++i) {
     const LoadedScene& kind = loaded.kinds[loaded.bodies[i].kind].loaded;
     OrderedJson body = OrderedJson::object();
-    if (config.is_list)
-      body = {{"name", loaded.bodies[i].name},
-              {"bundle_input_sha256", kind.summary.input_sha256}};
+    if (config.is_list) body = {{"name", loaded.bodies[i].name}, {"bundle_input_sha256", kind.summary.input_sha256}};
     body.update(state_to_json(memory.states[i], *kind.model->frame));
     document["bodies"].push_back(std::move(body));
   }

@@ -264,6 +264,7 @@ def test_a_body_of_no_finite_numbers_is_named(world, free_bundle):
     damped = exmat.Model(free_bundle, time_step=STEP, use_contact=True, stiffness_damping=1e300)
     world.remove(1)
     broken = world.add(body_at(damped, (9, 0, 0)))
+    world[broken].set_group(2, 0)  # it reaches all others
     world[broken].set_reduced(*2 * [np.full(damped.modes, 1e30)])
     with pytest.raises(exmat.NonFinite, match=f"body {broken}"):
         world.step(5)

@@ -59,9 +59,10 @@ bool FullContacts::begin(const Obstacles& obstacles, double end_time, double tim
       candidate.obstacle = static_cast<int>(i);
       const Eigen::Vector3d ahead = time_step * at(vertex, v);
       const Eigen::Vector3d predicted = here + ahead;
-      freeze_contact(contact.obstacles[i], find_held(held, next, candidate),
-                     {here, predicted, predicted + ahead + time_step * time_step * gravity, centre, load_, held.first_step},
-                     areas_[vertex], time_step, candidate);
+      freeze_contact(
+          contact.obstacles[i], find_held(held, next, candidate),
+          {here, predicted, predicted + ahead + time_step * time_step * gravity, centre, load_, held.first_step},
+          areas_[vertex], time_step, candidate);
     }
   }
   return contact.candidate_count > 0;
