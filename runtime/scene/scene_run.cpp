@@ -208,26 +208,19 @@ void find_in_obstacles(World& world, double least, std::optional<StartOverlap>& 
   }
 }
 
-/// After the first step: vertices in other bodies of which it has begun to let out `step` [m].
-void find_in_bodies(const World& world, double step, std::optional<StartOverlap>& deepest) {
+/// Vertices deeper than `least` [m] in other bodies: by a step of bodies of its own that lets out next to nothing.
+void find_in_bodies(const LoadedWorld& loaded, WorldConfig config, double least, std::optional<StartOverlap>& deepest) {
+  config.contact.release = 1e-6 * kRelease;
+  Bodies bodies(loaded, config);
+  bodies.step();
+  const World& world = bodies.world();
   for (const HeldPair& pair : world.held())
     for (const int side : {0, 1})
       for (const HeldBodyContact& held : pair.held[static_cast<std::size_t>(side)]) {
         const int body = side == 0 ? pair.first : pair.second, other = side == 0 ? pair.second : pair.first;
         const int vertex = world.model(body).contact->object_vertex(held.vertex);
-        keep_deeper({body, other, false, vertex, held.overlap + step}, step, deepest);
+        keep_deeper({body, other, false, vertex, held.overlap}, least, deepest);
       }
-}
-
-/// The deepest of what overlaps at the start, if any: by a step of its own at kRelease, where the scene lets out
-/// faster, for that may leave nothing to be found after the first one.
-std::optional<StartOverlap> overlap_of_fast_release(const LoadedWorld& loaded, WorldConfig config) {
-  config.contact.release = kRelease;
-  Bodies bodies(loaded, config);
-  std::optional<StartOverlap> deepest;
-  bodies.step();
-  find_in_bodies(bodies.world(), config.time_step * kRelease, deepest);
-  return deepest;
 }
 
 }  // namespace
@@ -237,11 +230,8 @@ RunSummary run(const LoadedWorld& loaded, const WorldConfig& config, const RunOp
   World& world = bodies.world();
   if (options.from_state) bodies.take_up(read_state(*options.from_state, loaded, config));
   RunSummary summary = empty_summary(config, bodies, options.profiled);
-  const bool is_fast = config.contact.release > kRelease;
-  if (!options.from_state) {
-    if (is_fast) summary.overlap = overlap_of_fast_release(loaded, config);
-    find_in_obstacles(world, config.time_step * std::min(config.contact.release, kRelease), summary.overlap);
-  }
+  const double one_step = config.time_step * std::min(config.contact.release, kRelease);  // such depths are contacts
+  if (!options.from_state) find_in_obstacles(world, one_step, summary.overlap);
   const auto trajectory = open_trajectory(loaded, config);
   const auto append = [&](double seconds) {
     for (std::size_t i = 0; i < trajectory->bodies(); ++i) {
@@ -266,8 +256,9 @@ RunSummary run(const LoadedWorld& loaded, const WorldConfig& config, const RunOp
     if (options.keeps_contacts) contacts.add_touches();
     add(report, world, seconds, summary);
     breaks.find(summary.broken);
-    if (summary.steps == 1 && !options.from_state && !is_fast)
-      find_in_bodies(world, config.time_step * config.contact.release, summary.overlap);
+    // One that lets out faster may have left nothing.
+    if (summary.steps == 1 && !options.from_state && (!world.held().empty() || config.contact.release > kRelease))
+      find_in_bodies(loaded, config, one_step, summary.overlap);
     const Timer output;
     const bool written = trajectory && summary.steps % config.every == 0;
     if (written) append(seconds / world.count());

@@ -202,13 +202,12 @@ TEST_F(BuildPipeline, TheReportIsWrittenOfAFailure) {
   // Not even an asset.
   EXPECT_EQ(bundle(folder_ / "none.json", {"--report", report_}).status, kBadInput);
   EXPECT_THAT(report()["message"], HasSubstr("none.json"));
-  // No place for the bundle: a failure while working.
+  // No place for the bundle or for the report: known before the work.
   const Outcome failed = exmat_precompute({"bundle", asset, "-o", folder_ / "no/folder.h5", "--report", report_});
-  EXPECT_EQ(failed.status, kFailure);
-  EXPECT_EQ(report()["exit_status"], kFailure);
-  // No place for the report: known before the work.
+  EXPECT_EQ(failed.status, kBadInput);
+  EXPECT_EQ(report()["exit_status"], kBadInput);
   const Outcome nowhere = bundle(asset, {"--report", folder_ / "no/report.json"});
-  EXPECT_EQ(nowhere.status, kFailure);
+  EXPECT_EQ(nowhere.status, kBadInput);
   EXPECT_THAT(nowhere.errors, HasSubstr("no/report.json"));
   EXPECT_FALSE(std::filesystem::exists(bundle_));
 }

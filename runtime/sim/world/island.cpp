@@ -635,10 +635,8 @@ bool is_isolated(std::span<WorldBody* const> bodies) noexcept {
 /// Energy of the springs of obstacles where the step has led [J].
 double obstacle_energy(std::span<WorldBody* const> bodies) noexcept {
   double sum = 0;
-  for (const WorldBody* const own : bodies) {
-    const Eigen::Vector3d position = own->model.frame->placement(own->state.frame).position;
-    sum += own->near().contact.end_energy(own->full ? Eigen::Vector3d(0, 0, 0) : position);
-  }
+  for (const WorldBody* const own : bodies)
+    sum += own->near().contact.end_energy(own->model.frame->placement(own->state.frame).position);
   return sum;
 }
 

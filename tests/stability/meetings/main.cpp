@@ -1,7 +1,7 @@
 // Bodies that meet, at the ends of every range: which of them gain energy or end.
 //   exmat-meetings [COUNT [FULL]]
-// takes COUNT of them at random, 0: all; FULL of the two bodies step in all vertices. docs/stability.md, "Bodies that
-// meet".
+// takes COUNT of them at random, 0: all; FULL of the two bodies step in all vertices. Then as many, or 400, that others
+// squeeze against a plane, in their modes. docs/stability.md, "Bodies that meet".
 
 #include <chrono>
 #include <cstdio>
@@ -49,5 +49,14 @@ int main(int argc, char** argv) {
   std::printf(
       "%zu meetings: %d gain energy, at most %g times; %d end, %d lose momentum; %d of %d steps unconverged; %.1f s\n",
       meetings.size(), gain, highest, ended, drifted, unconverged, steps, seconds.count());
-  return gain + ended + drifted > 0 ? 1 : 0;
+  const std::size_t squeezes = count > 0 ? count : 400;
+  int squeezed = 0;
+  for (const test::Squeeze& squeeze : test::some_squeezes(squeezes, 7)) {
+    const double peak = test::peak_of(squeeze);
+    if (peak <= 1 + kGain) continue;
+    ++squeezed;
+    std::printf("squeezed, plane %g, contact %g N/m^3: peak %g\n", squeeze.plane_stiffness, squeeze.stiffness, peak);
+  }
+  std::printf("%zu squeezed against a plane: %d gain energy\n", squeezes, squeezed);
+  return gain + ended + drifted + squeezed > 0 ? 1 : 0;
 }

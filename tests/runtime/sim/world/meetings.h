@@ -129,4 +129,65 @@ inline std::vector<Meeting> some_meetings(std::size_t count, std::uint32_t seed)
   return some;
 }
 
+/// Two bars and a soft cube, one behind the other, before a plane x = 0 that the latter two fly at by 50 m/s.
+struct Squeeze {
+  std::array<Eigen::Vector3d, 3> places;      ///< of their corners [m]
+  double first_speed = 0;                     ///< speed of the first bar towards the plane [m/s]
+  double plane_stiffness = 0, stiffness = 0;  ///< of the plane and between them [N/m^3]
+};
+
+/// Largest sum of kinetic and elastic energy in a second, over the start.
+inline double peak_of(const Squeeze& squeeze) {
+  constexpr double kStep = 1.0 / 60, kPoisson = 0.3;
+  Blocks bars(kStep, {.cells = {8, 2, 2},
+                      .lengths = {1, 0.25, 0.25},
+                      .youngs_modulus = 1e6,
+                      .poisson_ratio = kPoisson,
+                      .free = true,
+                      .linear_modes = 15});
+  Blocks cubes(kStep, {.cells = {3, 3, 3},
+                       .lengths = {1, 1, 1},
+                       .youngs_modulus = 3e3,
+                       .poisson_ratio = kPoisson,
+                       .free = true,
+                       .linear_modes = 12});
+  const Plane plane{{0, 0, 0}, Eigen::Vector3d::UnitX()};
+  for (Blocks* const blocks : {&bars, &cubes})
+    blocks->scene.obstacles.push_back(Obstacle{plane, RigidMotion(), squeeze.plane_stiffness, 0, 0});
+  std::vector<WorldBodyStart> bodies;
+  bodies.push_back(bars.body(squeeze.places[0], {-squeeze.first_speed, 0, 0}));
+  bodies.push_back(bars.body(squeeze.places[1], {-50, 0, 0}));
+  bodies.push_back(cubes.body(squeeze.places[2], {-50, 0, 0}));
+  World world(std::move(bodies), {squeeze.stiffness, 0, 0});
+  const double start = world.energies().total();
+  double peak = 0;
+  for (int i = 0; i < 60; ++i) {
+    world.step(1);
+    if (!(world.energies().total() / start <= peak)) peak = world.energies().total() / start;
+  }
+  return peak;
+}
+
+/// So many of them, at random.
+inline std::vector<Squeeze> some_squeezes(std::size_t count, std::uint32_t seed) {
+  std::mt19937 generator(seed);
+  const auto between = [&](double low, double high) {
+    return low + (high - low) * (static_cast<double>(generator()) / 4294967296.0);
+  };
+  const auto aside = [&](double centre) { return centre + between(-0.4, 0.4); };
+  std::vector<Squeeze> some(count);
+  for (Squeeze& own : some) {
+    double x = between(0.5, 1.5);
+    for (Eigen::Vector3d& place : own.places) {
+      const double centre = &place == &own.places.back() ? -0.4 : 0;  // cubes are wider
+      place = {x, aside(centre), aside(centre)};
+      x += aside(1.2);
+    }
+    own.first_speed = 10.0 * (generator() % 2);
+    own.plane_stiffness = std::pow(10, between(6, 8));
+    own.stiffness = std::pow(10, between(6, 9));
+  }
+  return some;
+}
+
 }  // namespace exmat::runtime::test
