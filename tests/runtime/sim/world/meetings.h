@@ -181,7 +181,7 @@ inline std::vector<Squeeze> some_squeezes(std::size_t count, std::uint32_t seed)
     for (Eigen::Vector3d& place : own.places) {
       const double centre = &place == &own.places.back() ? -0.4 : 0;  // cubes are wider
       place = {x, aside(centre), aside(centre)};
-      x += aside(1.2);
+      x += between(1.05, 1.65);
     }
     own.first_speed = 10.0 * (generator() % 2);
     own.plane_stiffness = std::pow(10, between(6, 8));
