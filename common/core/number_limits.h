@@ -12,8 +12,8 @@ inline constexpr double kFarthest = 1e30;
 /// False for NaN, too.
 inline bool is_near(double number) noexcept { return std::abs(number) <= kFarthest; }
 
-/// How far apart numbers of 16 digits are `far` from the origin, where that is more than solvers ask for of a body so
-/// long; else 0 [m].
+/// Doubles that are `far` from the origin are so far apart [m]; 0 if a body of this length loses no detail by it that
+/// solvers ask for.
 inline double lost_detail(double far, double length) noexcept {
   constexpr double kLostShare = 1e-9;  // of the length, by rounding
   const double gap = far * std::numeric_limits<double>::epsilon();

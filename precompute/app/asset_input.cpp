@@ -8,6 +8,7 @@
 #include "common/core/input_file.h"
 #include "common/core/log.h"
 #include "precompute/inputs/assumed_asset.h"
+#include "precompute/mesh_io/surface_file.h"
 
 namespace exmat {
 

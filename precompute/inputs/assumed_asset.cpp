@@ -10,7 +10,6 @@
 
 #include "common/core/command_files.h"
 #include "common/core/error.h"
-#include "common/core/input_file.h"
 #include "common/core/log.h"
 #include "common/mesh/geometry.h"
 #include "precompute/mesh_io/surface_file.h"
@@ -19,7 +18,6 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr std::array<std::string_view, 5> kExtensions = {".glb", ".gltf", ".obj", ".ply", ".stl"};
 constexpr double kDensity = 1000, kGravity = 9.81;  // [kg/m^3], [m/s^2]
 constexpr std::array<const char*, 2> kClamps{"_FIXED", "_PINNED"};
 constexpr std::size_t kLongestName = 64, kMostExamples = 64;  // of schemas/asset.json
@@ -75,10 +73,6 @@ std::vector<std::string> example_names(const std::vector<std::string>& morphs) {
     names.push_back(name);
   }
   return names;
-}
-
-bool is_surface_file(const std::filesystem::path& file) {
-  return std::ranges::find(kExtensions, lower_extension(file)) != kExtensions.end();
 }
 
 Json assumed_asset(const std::filesystem::path& surface, const std::filesystem::path& folder) {

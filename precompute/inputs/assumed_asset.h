@@ -8,9 +8,6 @@
 
 namespace exmat::precompute {
 
-/// True if the extension is that of a file of surfaces.
-bool is_surface_file(const std::filesystem::path& file);
-
 /// The content of the ASSET.json that a surface alone stands for, with every member that matters written out: its morph
 /// targets, the first 64 of them, are the examples, its attribute _FIXED is the clamp, and its material bears
 /// kBorneHeights times its weight. Paths in it are relative to `folder`. Throws as read_surface_file.

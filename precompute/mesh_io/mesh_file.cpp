@@ -1,22 +1,14 @@
 #include "precompute/mesh_io/mesh_file.h"
 
-#include <algorithm>
-#include <array>
-#include <string_view>
-
 #include "common/core/input_file.h"
 #include "precompute/mesh_io/medit_reader.h"
 #include "precompute/mesh_io/msh_reader.h"
+#include "precompute/mesh_io/surface_file.h"
 #include "precompute/mesh_io/tetgen_reader.h"
 #include "precompute/mesh_io/veg_reader.h"
 #include "precompute/mesh_io/vtk_reader.h"
 
 namespace exmat::precompute {
-namespace {
-
-constexpr std::array<std::string_view, 5> kSurfaces{".glb", ".gltf", ".obj", ".ply", ".stl"};
-
-}  // namespace
 
 MeshFile read_mesh(const std::filesystem::path& file) {
   refuse_other_kind(file);
@@ -26,9 +18,8 @@ MeshFile read_mesh(const std::filesystem::path& file) {
   if (extension == ".node" || extension == ".ele") return read_tetgen(file);
   if (extension == ".mesh") return read_medit(file);
   if (extension == ".vtk") return read_vtk(file);
-  const bool is_surface = std::ranges::find(kSurfaces, extension) != kSurfaces.end();
   refuse_extension(file, "a mesh file with the extension .veg, .msh, .node, .ele, .mesh or .vtk",
-                   is_surface ? "it is a surface: name it by \"surface\" in place of \"mesh\"" : "");
+                   is_surface_file(file) ? "it is a surface: name it by \"surface\" in place of \"mesh\"" : "");
 }
 
 }  // namespace exmat::precompute

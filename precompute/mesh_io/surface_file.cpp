@@ -1,6 +1,9 @@
 #include "precompute/mesh_io/surface_file.h"
 
+#include <algorithm>
+#include <array>
 #include <fmt/format.h>
+#include <string_view>
 
 #include "common/core/input_file.h"
 #include "common/core/log.h"
@@ -32,6 +35,11 @@ Eigen::Index settle_loose_vertices(const TriangleArray& triangles, VertexArray& 
   for (Eigen::Index v = 0; v < vertices.rows(); ++v)
     if (used[v] == 0) vertices.row(v) = vertices.row(triangles(0, 0));
   return (used.array() == 0).count();
+}
+
+bool is_surface_file(const std::filesystem::path& file) {
+  constexpr std::array<std::string_view, 5> kExtensions{".glb", ".gltf", ".obj", ".ply", ".stl"};
+  return std::ranges::find(kExtensions, lower_extension(file)) != kExtensions.end();
 }
 
 SurfaceFile read_surface_file(const std::filesystem::path& file) {

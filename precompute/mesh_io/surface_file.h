@@ -7,6 +7,9 @@
 
 namespace exmat::precompute {
 
+/// True if the extension is one that read_surface_file() reads.
+bool is_surface_file(const std::filesystem::path& file);
+
 /// Reads by extension: .glb and .gltf (glTF 2.0), .obj (Wavefront), .ply (text and binary), .stl (text and binary).
 /// Polygons become triangles (common/surface_io/polygon_faces.h). Vertices of no triangle are settled. Parts are the
 /// vertices of a glTF file's materials, meshes, nodes and custom attributes, of an .obj's `o`, `g` and `usemtl`, and of

@@ -84,8 +84,8 @@ void visit_pairs(Archive& archive, World& world, Pairs& pairs) {
   }
 }
 
-/// Number of bodies; the state of each; number of pairs; of each its bodies, its energy and its
-/// account, the number of vertices of either that touch, and ten numbers for each of these.
+/// Number of bodies; the state of each; number of pairs; of each its bodies, its energy and its account, the number of
+/// vertices of either that touch, and ten numbers for each of these.
 template <typename Archive, typename World>
 void visit_motion(Archive& archive, World& world) {
   archive.same("bodies", static_cast<double>(world.members.size()), "", ", those of the world");

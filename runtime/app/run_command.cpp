@@ -136,7 +136,7 @@ double length_of(const Model& model) {
   return model.contact ? 2 * model.contact->reach() : 1;
 }
 
-/// Of the farthest body that begins where numbers do not hold its shape.
+/// Names the farthest body that begins where doubles do not hold its shape.
 void warn_of_places(const LoadedWorld& loaded) {
   std::vector<double> lengths;
   for (const LoadedKind& kind : loaded.kinds) lengths.push_back(length_of(*kind.loaded.model));

@@ -55,7 +55,7 @@ class TrajectoryReader {
   template <typename Value>
   std::optional<Value> attribute(const std::string& name, const char* expected) const;
   Hdf5Dataset open_dataset(const std::string& path);
-  /// Of the body that is selected, all that any format draws: finite numbers, times, checksums.
+  /// Checks all that any format draws of the selected body: finite numbers, times, checksums.
   void check_motion();
   void check_sum(const Hdf5Dataset& dataset, std::uint32_t crc) const;
   template <typename Array>

@@ -105,10 +105,8 @@ struct Gathering {
     candidates.all.clear();
     surface_radius = b.touching.surface.bound(b.pose.q).radius;
     deepest = anew ? 2 * surface_radius : 0;
-    for (const HeldBodyContact& contact : held) {
-      deepest = std::max(deepest, -contact.gap);
-      overlaps = overlaps || contact.overlap > 0;
-    }
+    overlaps = overlap(held);
+    for (const HeldBodyContact& contact : held) deepest = std::max(deepest, -contact.gap);
   }
 
   /// A vertex, with its place from the other body's, world, and in the frame of that body [m].
@@ -316,6 +314,10 @@ Eigen::Vector3d place_of(const BodyPose& a, const BodyPose& b, const BodyCandida
 }
 
 }  // namespace
+
+bool overlap(const std::vector<HeldBodyContact>& held) noexcept {
+  return std::ranges::any_of(held, [](const HeldBodyContact& contact) { return contact.overlap > 0; });
+}
 
 std::optional<Eigen::Vector3d> way_out_of(const TouchingBody& a, const TouchingBody& b) {
   struct Extent {

@@ -21,6 +21,9 @@ struct HeldBodyContact {
   double overlap = 0;                                 ///< that is not released yet [m]
 };
 
+/// True if one of them has not left what it overlapped at the start.
+bool overlap(const std::vector<HeldBodyContact>& held) noexcept;
+
 /// A vertex of one body that may touch the surface of another in this step. Its law is that of contact_law.h with the
 /// place of the vertex from the surface's material point y in place of its place in the world; point and normal are
 /// those of the beginning of the step.

@@ -90,7 +90,7 @@ void ContactWorkspace::refresh_friction(FrictionChange& change) noexcept {
 double ContactWorkspace::start_energy() const noexcept {
   double sum = 0;
   for (const ContactCandidate& candidate : std::span(candidates).first(candidate_count))
-    sum += start_energy_of(obstacles[static_cast<std::size_t>(candidate.obstacle)], candidate);
+    sum += stored_energy(candidate, candidate.start_gap, candidate.carried);
   return sum;
 }
 

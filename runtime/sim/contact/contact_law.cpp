@@ -84,6 +84,7 @@ void freeze_contact(const ContactLaw& law, const SurfacePoint& surface, const Ei
   const double predicted_gap = surface.distance + surface.normal.dot(predicted - carried);
   const bool touches = std::min(surface.distance, predicted_gap) < 0;
   candidate.normal = surface.normal;
+  candidate.start_gap = surface.distance;
   candidate.clearance = -1;
   candidate.stiffness = law.stiffness * area;
   candidate.damping = touches ? law.damping / (law.stiffness * time_step) : 0;
@@ -130,6 +131,7 @@ void freeze_contact(const PlacedObstacle& placed, const HeldContact* held, const
   }
   const ContactLaw law{obstacle.stiffness, obstacle.damping, obstacle.friction, obstacle.release};
   freeze_contact(law, surface, way.carried, motion.predicted, area, time_step, candidate);
+  if (candidate.passage.kind == Passage::Kind::kWatched) candidate.start_gap = gap_at(placed, candidate, way.carried);
   const double depth = -surface.distance;
   const double before = held != nullptr ? held->overlap : was_put(depth, gone) ? depth : 0;
   if (before > 0) {
@@ -191,13 +193,8 @@ double contact_potential(const PlacedObstacle& placed, const ContactCandidate& c
   return contact_potential(candidate, gap_at(placed, candidate, point), point);
 }
 
-double start_energy_of(const PlacedObstacle& placed, const ContactCandidate& candidate) noexcept {
-  return stored_energy(candidate, gap_at(placed, candidate, candidate.carried), candidate.carried);
-}
-
 double stored_energy(const ContactCandidate& candidate, double gap, const Eigen::Vector3d& point) noexcept {
-  const double depth = std::max(0.0, -gap - candidate.overlap);
-  const double normal = 0.5 * candidate.stiffness * depth * depth;
+  const double normal = candidate.spring_energy(-gap - candidate.overlap);
   if (candidate.friction_force <= 0) return normal;
   const double longest = 2 * candidate.friction_force / candidate.stiffness;  // beyond it slides
   const double stretch = tangential(point - candidate.anchor, candidate.normal).norm();

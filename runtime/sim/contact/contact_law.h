@@ -79,6 +79,7 @@ struct ContactCandidate {
   double stiffness = 0;                               ///< kappa = area * stiffness [N/m]
   double damping = 0;                                 ///< gamma = damping / (stiffness * time step) if it touches
   double spring_share = 1;                            ///< 1 / (1 + gamma)
+  double start_gap = 0;                               ///< where the step begins [m]
   double friction_force = 0;                          ///< mu lambda, lambda the lagged normal force [N]
   double overlap = 0;                                 ///< part of the depth that pushes nothing yet [m]
   double released = 0;                                ///< energy that its spring has by what is released [J]
@@ -110,6 +111,8 @@ struct ContactCandidate {
   }
   /// So is one whose numbers overflowed: its force tells.
   bool is_loaded() const noexcept { return !(normal_force <= 0) || friction_force > 0; }
+  /// Energy of the spring alone, pressed so deep [m] [J].
+  double spring_energy(double depth) const noexcept { return depth > 0 ? 0.5 * stiffness * depth * depth : 0; }
   /// No friction keeps bodies from leaving what they overlap.
   bool rubs() const noexcept { return overlap <= 0; }
   /// Derivative of the normal force by the depth [N/m]; 0 where there is no force.
@@ -176,8 +179,6 @@ double contact_potential(const PlacedObstacle& placed, const ContactCandidate& c
 /// Energy that the springs of a candidate hold at `point`, `gap` from the surface [J]: those that damp and the way that
 /// it slides apart.
 double stored_energy(const ContactCandidate& candidate, double gap, const Eigen::Vector3d& point) noexcept;
-/// The same where the step begins, of an obstacle that does not move.
-double start_energy_of(const PlacedObstacle& placed, const ContactCandidate& candidate) noexcept;
 
 /// Change of the friction forces when lambda is updated.
 struct FrictionChange {

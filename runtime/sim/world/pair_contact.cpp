@@ -22,10 +22,6 @@ auto see(const WorldBody& first, const WorldBody& second, const Work& work) {
   return with_second(ReducedSide{first.contact(), first_pose, first.rigid()});
 }
 
-double energy_of_spring(const ContactCandidate& candidate, double depth) {
-  return depth > 0 ? 0.5 * candidate.stiffness * depth * depth : 0;
-}
-
 /// Columns about world axes become those of the unknowns.
 void to_unknowns(const WorldBody& body, const Eigen::VectorXd& x, Eigen::Index used, Eigen::MatrixXd& columns) {
   if (body.rigid() == 0 || body.full) return;
@@ -86,7 +82,7 @@ void PairContact::begin_account() noexcept {
   released_ = 0;
   for (const BodyCandidates& candidates : candidates_)
     for (const BodyCandidate& candidate : candidates.all) {
-      energy += energy_of_spring(candidate, depth_of(candidate));
+      energy += candidate.spring_energy(depth_of(candidate));
       released_ += candidate.released;
     }
   const bool is_known = held_ == nullptr || std::isfinite(held_->account);
@@ -115,11 +111,12 @@ void PairContact::end_account(const WorldBody& first, const WorldBody& second, c
       force += (at == 0 ? 1 : -1) * candidate.force;
     }
   }
-  if (converged && released_ > 0) given = given > released_ ? given - released_ : std::min(given, 0.0);
-  if (converged)
-    account_ += 0.5 * first.scene().time_step * force.dot(parted) - given - released_;
-  else
+  if (converged) {
+    const double owed = given - std::min(std::max(given, 0.0), released_);  // what was released is given first
+    account_ += 0.5 * first.scene().time_step * force.dot(parted) - owed - released_;
+  } else {
     account_ += spring_energy() - start_energy_;
+  }
   if (released_ > 0) account_ = std::max(account_, spring_energy());
   account_ = std::isfinite(account_) ? std::max(0.0, account_) : 0;
 }
@@ -128,7 +125,7 @@ double PairContact::spring_energy() const noexcept {
   double sum = 0;
   for (const BodyCandidates& candidates : candidates_)
     for (const BodyCandidate& candidate : candidates.all)
-      sum += energy_of_spring(candidate, -candidate.gap - candidate.overlap);
+      sum += candidate.spring_energy(-candidate.gap - candidate.overlap);
   return sum;
 }
 

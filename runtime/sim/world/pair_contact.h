@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <algorithm>
 #include <array>
 #include <span>
 #include <vector>
@@ -20,11 +19,7 @@ struct HeldPair {
   double account = 0;  ///< the most that they may hold where the next step begins [J]; not finite: what they do hold
 
   /// True if some vertices have not left what they overlapped at the start.
-  bool overlaps() const noexcept {
-    return std::ranges::any_of(held, [](const std::vector<HeldBodyContact>& side) {
-      return std::ranges::any_of(side, [](const HeldBodyContact& contact) { return contact.overlap > 0; });
-    });
-  }
+  bool overlaps() const noexcept { return overlap(held[0]) || overlap(held[1]); }
 };
 
 /// A vertex of one body that touched the surface of another, or of its own, at the end of a step.

@@ -138,19 +138,16 @@ struct Squeeze {
 
 /// Largest sum of kinetic and elastic energy in a second, over the start.
 inline double peak_of(const Squeeze& squeeze) {
-  constexpr double kStep = 1.0 / 60, kPoisson = 0.3;
-  Blocks bars(kStep, {.cells = {8, 2, 2},
-                      .lengths = {1, 0.25, 0.25},
-                      .youngs_modulus = 1e6,
-                      .poisson_ratio = kPoisson,
-                      .free = true,
-                      .linear_modes = 15});
-  Blocks cubes(kStep, {.cells = {3, 3, 3},
-                       .lengths = {1, 1, 1},
-                       .youngs_modulus = 3e3,
-                       .poisson_ratio = kPoisson,
-                       .free = true,
-                       .linear_modes = 12});
+  const auto blocks_of = [](std::array<int, 3> cells, std::array<double, 3> lengths, double youngs_modulus, int modes) {
+    return exmat::test::BarOptions{.cells = cells,
+                                   .lengths = lengths,
+                                   .youngs_modulus = youngs_modulus,
+                                   .poisson_ratio = 0.3,
+                                   .free = true,
+                                   .linear_modes = modes};
+  };
+  Blocks bars(1.0 / 60, blocks_of({8, 2, 2}, {1, 0.25, 0.25}, 1e6, 15));
+  Blocks cubes(1.0 / 60, blocks_of({3, 3, 3}, {1, 1, 1}, 3e3, 12));
   const Plane plane{{0, 0, 0}, Eigen::Vector3d::UnitX()};
   for (Blocks* const blocks : {&bars, &cubes})
     blocks->scene.obstacles.push_back(Obstacle{plane, RigidMotion(), squeeze.plane_stiffness, 0, 0});
