@@ -168,7 +168,7 @@ struct Gathering {
     if (hit && (hit->distance >= 0 || before != nullptr)) take(placed(vertex), before, hit);
   }
   void test_own(int vertex) {
-    if (a.touching.vertex_bounds.row(vertex).dot(a.pose.q.cwiseAbs()) < 1) return;
+    if (!a.touching.may_meet_itself(vertex, a.set, a.pose.q)) return;
     test_own(vertex, a.set.place(vertex, shape.x), Eigen::Vector3d::Zero(), std::nullopt);
   }
   void test(int vertex) { own ? test_own(vertex) : test_other(vertex); }
@@ -183,7 +183,7 @@ struct Gathering {
     const std::size_t index = candidates.all.size() - 1;
     append_rows(candidates, b.pose.q.size());
     const auto set_place = [&](const SurfaceHit& found) {
-      candidate.rest = b.touching.surface.rest_of(found);
+      candidate.rest = b.touching.surface.place_of(found);
       candidates.places.resize(std::max(candidates.places.size(), candidates.all.size()));
       candidates.places[index] = {found.triangle, found.barycentric};
       b.touching.surface.basis_of(found, candidates.rows(index));
@@ -269,11 +269,21 @@ Placement a_in_b(const BodyPose& a, const BodyPose& b) {
   return relative;
 }
 
+/// The most that a vertex has gone from `then`, of a body that was moved there, too; infinite where only one of the two
+/// is so [m].
+double way_from(const VertexArray& then, const ContactSet& set, const VertexArray& places) {
+  if (set.is_moved() != (then.rows() > 0)) return std::numeric_limits<double>::infinity();
+  return set.is_moved() ? std::sqrt((places - then).rowwise().squaredNorm().maxCoeff()) : 0;
+}
+
 /// Bound on how far vertices of a and the surface of b have moved against each other since the search [m].
 double way_between(const TouchingBody& a, const TouchingBody& b, const NearVertices& near) {
   if (near.radius < 0) return 0;
+  const double own =
+      way_from(near.places_a, a.set, a.set.places()) + way_from(near.places_b, b.set, b.touching.surface.places());
+  if (std::isinf(own)) return own;
   const Placement relative = a_in_b(a.pose, b.pose);
-  return way_bound(a.set.reach(), a.set.tree().movement(), BodyPose{relative, a.pose.q}, near.a_in_b, near.q_a) +
+  return own + way_bound(a.set.reach(), a.set.tree().movement(), BodyPose{relative, a.pose.q}, near.a_in_b, near.q_a) +
          b.touching.surface.movement().of(b.pose.q - near.q_b);
 }
 
@@ -299,6 +309,11 @@ void gather_from(Gathering& gathering, NearVertices& near, const TestAll& test_a
     near.a_in_b = a_in_b(a.pose, b.pose);
     near.q_a = a.pose.q;
     near.q_b = b.pose.q;
+    const auto keep = [](bool is_moved, const VertexArray& places, VertexArray& kept) {
+      is_moved ? void(kept = places) : kept.resize(0, 3);
+    };
+    keep(a.set.is_moved(), a.set.places(), near.places_a);
+    keep(b.set.is_moved(), b.touching.surface.places(), near.places_b);
     near.found.clear();
     near.served = 1;
     return find(radius, near.radius);
@@ -384,25 +399,19 @@ void BodyContact::gather_own(const TouchingBody& body, const CandidateSearch& se
   Gathering gathering{law_, body, body, search, farthest, /*own=*/true, candidates};
   gathering.is_fast = is_fast;
   gathering.near = margin + way;
-  const auto approach = [&](int vertex) { return touching.vertex_bounds.row(vertex).dot(body.pose.q.cwiseAbs()); };
   const auto test_placed = [&](double radius) {
     const LeafQuery reach{.radius = radius,
                           .near = gathering.near + gathering.deepest,
                           .time = kContactMarginSteps * time_step,
                           .share = kSurelyApproached};
     near.own.search(
-        set, surface, shape, reach, [&](int vertex) { return approach(vertex) >= 1; },
+        set, surface, shape, reach, [&](int vertex) { return touching.may_meet_itself(vertex, set, body.pose.q); },
         [&](const OwnSearch::Found& found) { gathering.test_own(found); });
   };
   const auto find = [&](double radius, double farther) {
     // Until the next search either moves by half of that at most.
     const double half = 0.5 * near.farther;
-    const auto wanted = [&](int vertex) {
-      const double now = approach(vertex);
-      const auto bounds = touching.vertex_bounds.row(vertex);
-      return now >= 1 ||
-             now + std::max(set.tree().movement().most(bounds, half), surface.movement().most(bounds, half)) >= 1;
-    };
+    const auto wanted = [&](int vertex) { return touching.may_meet_itself(vertex, set, body.pose.q, half); };
     place_all();
     const auto look = [&](const OwnSearch::Found& found) {
       const SurfaceHit& place = touching.places[static_cast<std::size_t>(found.vertex)];

@@ -28,7 +28,7 @@ bool overlap(const std::vector<HeldBodyContact>& held) noexcept;
 /// place of the vertex from the surface's material point y in place of its place in the world; point and normal are
 /// those of the beginning of the step.
 struct BodyCandidate : ContactCandidate {
-  Eigen::Vector3d rest = Eigen::Vector3d::Zero();         ///< y at rest, frame of the other body [m]
+  Eigen::Vector3d rest = Eigen::Vector3d::Zero();         ///< y where q = 0, frame of the other body [m]
   Eigen::Vector3d surface_arm = Eigen::Vector3d::Zero();  ///< y - position of the other body [m]; last evaluation
 };
 
@@ -72,6 +72,7 @@ struct NearVertices {
   // Poses of the bodies in the search.
   Placement a_in_b;  ///< a in the frame of b
   Eigen::VectorXd q_a, q_b;
+  VertexArray places_a, places_b;  ///< places() of those that ContactSet::move() has moved [k x 3, m]; empty: of others
 
   OwnSearch own;  ///< scratch for a body with itself
 };

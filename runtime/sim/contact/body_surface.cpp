@@ -77,6 +77,7 @@ TriangleArray neighbours_of(const TriangleArray& triangles) {
 BodySurface::BodySurface(const VertexArray& rest, const RowMatrix& basis, TriangleArray triangles,
                          const Eigen::Vector3d& origin)
     : rest_(rest.rowwise() - origin.transpose()),
+      places_(rest_),
       rows_(basis, Eigen::VectorXi::LinSpaced(rest.rows(), 0, static_cast<int>(rest.rows()) - 1)),
       object_vertices_(static_cast<std::size_t>(rest.rows())),
       triangles_(std::move(triangles)),
@@ -85,6 +86,7 @@ BodySurface::BodySurface(const VertexArray& rest, const RowMatrix& basis, Triang
       tree_(triangles_, rest_, basis, kLeafTriangles, /*full_leaves=*/true),
       leaves_(rest_, triangles_, tree_),
       reach_(rest.rows() > 0 ? rest_.rowwise().norm().maxCoeff() : 0) {
+  for (const DeformationTree::Node& node : tree_.nodes()) rest_balls_.push_back({node.centre, node.radius});
   std::iota(object_vertices_.begin(), object_vertices_.end(), 0);
   for (const std::int32_t vertex : triangles_.reshaped<Eigen::RowMajor>())
     ++fan_starts_[static_cast<std::size_t>(vertex) + 1];
@@ -116,13 +118,13 @@ BodySurface BodySurface::of_tets(const TetArray& tets, const VertexArray& rest, 
 }
 
 void BodySurface::move(const VertexArray& positions, const VertexArray& velocities) {
-  rest_ = positions;
+  places_ = positions;
   rows_.set_one_mode(velocities);
-  if (rest_.rows() == 0) return;
-  reach_ = rest_.rowwise().norm().maxCoeff();
+  if (places_.rows() == 0) return;
+  reach_ = places_.rowwise().norm().maxCoeff();
   tree_.fit(velocities.rowwise().norm().maxCoeff(), [this](int item, Eigen::AlignedBox3d& box) {
     const int triangle = tree_.order()[static_cast<std::size_t>(item)];
-    for (int c = 0; c < 3; ++c) box.extend(rest_.row(triangles_(triangle, c)).transpose());
+    for (int c = 0; c < 3; ++c) box.extend(places_.row(triangles_(triangle, c)).transpose());
   });
 }
 
@@ -130,7 +132,7 @@ SurfaceShape BodySurface::make_shape() const {
   SurfaceShape shape;
   shape.q.setZero(modes());
   shape.x = shape.v = AlignedArray(modes());
-  shape.positions = rest_;
+  shape.positions = places_;
   shape.position_of.assign(static_cast<std::size_t>(rest_.rows()), 0);
   shape.balls.resize(tree_.nodes().size());
   shape.boxes.resize(tree_.nodes().size());
@@ -171,7 +173,7 @@ Eigen::Vector3d BodySurface::position(int vertex, SurfaceShape& shape) const noe
   if (placed != shape.placed) {
     Eigen::Vector3d moved;
     rows_.products(&vertex, 1, shape.x, moved.data());
-    shape.positions.row(vertex) = rest_.row(vertex) + moved.transpose();
+    shape.positions.row(vertex) = places_.row(vertex) + moved.transpose();
     if (shape.moves) rows_.products(&vertex, 1, shape.v, shape.velocities.row(vertex).data());
     placed = shape.placed;
   }
@@ -181,7 +183,7 @@ Eigen::Vector3d BodySurface::position(int vertex, SurfaceShape& shape) const noe
 void BodySurface::place_all(SurfaceShape& shape) const noexcept {
   rows_.products_of_all(rest_.rows(), shape.x, shape.positions.data(), shape.moves ? &shape.v : nullptr,
                         shape.velocities.data());
-  shape.positions += rest_;
+  shape.positions += places_;
   std::ranges::fill(shape.position_of, shape.placed);
   leaves_.place_all(shape.positions, shape.moves ? &shape.velocities : nullptr, shape.leaves);
 }
@@ -367,8 +369,8 @@ auto BodySurface::approach_filter(const Eigen::Vector3d& point, const Eigen::Vec
     if (closing != nullptr && shape.box_of[index] == shape.placed &&
         is_far(*closing, bound, fastest_against(*closing, shape.velocity_boxes[index])))
       return true;
-    const DeformationTree::Node& branch = tree_.node(node);
-    return is_beyond(bound, (rest - branch.centre).norm() + branch.radius);
+    const DeformationTree::Ball& at_rest = rest_balls_[index];
+    return is_beyond(bound, (rest - at_rest.centre).norm() + at_rest.radius);
   };
   const int own = vertex_at(place);
   const auto excludes_triangle = [=, &shape, this](int triangle, double bound) {
@@ -411,7 +413,7 @@ std::optional<SurfaceHit> BodySurface::nearest_approached(const Eigen::Vector3d&
   const double itself = kOnTriangle * kOnTriangle * reach_ * reach_;
   std::optional<Eigen::Vector3d> facing;  // few vertices have come near to anything
   const auto accepts = [&](int triangle, const TrianglePoint& here) {
-    const double at_rest = (rest - rest_of({triangle, here.barycentric})).squaredNorm();
+    const double at_rest = (rest - point_of({triangle, here.barycentric}, rest_)).squaredNorm();
     if (!(here.squared_distance < kApproached * kApproached * at_rest) || at_rest <= itself) return false;
     if (!facing) facing = normal_of(place, shape);
     return !looks_along(triangle, *facing, shape);
@@ -500,9 +502,9 @@ Eigen::Vector3d BodySurface::outward(int triangle, const Eigen::Vector3d& baryce
   return length > 0 ? Eigen::Vector3d(normal / length) : Eigen::Vector3d::UnitZ();
 }
 
-Eigen::Vector3d BodySurface::rest_of(const SurfaceHit& hit) const noexcept {
+Eigen::Vector3d BodySurface::point_of(const SurfaceHit& hit, const VertexArray& vertices) const noexcept {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
-  for (int c = 0; c < 3; ++c) point += hit.barycentric[c] * rest_.row(triangles_(hit.triangle, c)).transpose();
+  for (int c = 0; c < 3; ++c) point += hit.barycentric[c] * vertices.row(triangles_(hit.triangle, c)).transpose();
   return point;
 }
 

@@ -75,7 +75,7 @@ class BodySurface {
   static BodySurface of_tets(const TetArray& tets, const VertexArray& rest, const RowMatrix& basis,
                              const Eigen::Vector3d& origin);
 
-  /// The same of ContactSet::move(). What approaches are told by stays as it was.
+  /// The same of ContactSet::move().
   void move(const VertexArray& positions, const VertexArray& velocities);
 
   Eigen::Index vertices() const noexcept { return rest_.rows(); }
@@ -144,11 +144,15 @@ class BodySurface {
   /// Barbic and James 2010). Takes k f r products.
   RowMatrix approach_bounds(const VertexArray& rest, const RowMatrix& basis) const;
 
-  /// Its material point of a hit: at rest [m], and the rows of the basis [3 x r].
-  Eigen::Vector3d rest_of(const SurfaceHit& hit) const noexcept;
+  /// The vertices at q = 0 [k x 3, m].
+  const VertexArray& places() const noexcept { return places_; }
+
+  /// Its material point of a hit: at q = 0 [m], and the rows of the basis [3 x r].
+  Eigen::Vector3d place_of(const SurfaceHit& hit) const noexcept { return point_of(hit, places_); }
   void basis_of(const SurfaceHit& hit, Eigen::Ref<RowMatrix> rows) const noexcept;
 
  private:
+  Eigen::Vector3d point_of(const SurfaceHit& hit, const VertexArray& vertices) const noexcept;
   bool is_block(int node) const noexcept;
   void count_look(SurfaceShape& shape) const noexcept;
   void open_block(int node, SurfaceShape& shape) const noexcept;
@@ -169,13 +173,15 @@ class BodySurface {
   Eigen::Vector3d outward(int triangle, const Eigen::Vector3d& barycentric, SurfaceShape& shape) const noexcept;
   Eigen::Vector3d vertex_normal(int vertex, SurfaceShape& shape) const noexcept;
 
-  VertexArray rest_;  // k x 3, X
-  VertexRows rows_;   // of the basis
+  VertexArray rest_;    // k x 3, X
+  VertexArray places_;  // k x 3, X unless moved
+  VertexRows rows_;     // of the basis
   std::vector<int> object_vertices_;
   TriangleArray triangles_;
-  TriangleArray neighbours_;            // f x 3, across the edge that begins at each corner; -1: none
-  std::vector<int> fan_starts_, fans_;  // triangles of each vertex
-  DeformationTree tree_;                // of the triangles
+  TriangleArray neighbours_;                       // f x 3, across the edge that begins at each corner; -1: none
+  std::vector<int> fan_starts_, fans_;             // triangles of each vertex
+  DeformationTree tree_;                           // of the triangles
+  std::vector<DeformationTree::Ball> rest_balls_;  // about its branches at rest
   SurfaceLeaves leaves_;
   double reach_ = 0;
 };

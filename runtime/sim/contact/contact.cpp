@@ -109,7 +109,7 @@ ContactSet::ContactSet(const ContactData& data, const Eigen::Vector3d& origin, d
   const bool numbered = data.vertices.size() == count;
   for (const int index : data_indices_)
     object_vertices_.push_back(numbered ? static_cast<int>(data.vertices[index]) : index);
-  rest_ = rest(data_indices_, Eigen::all);
+  rest_ = places_ = rest(data_indices_, Eigen::all);
   areas_ = data.areas(data_indices_);
   if (count > 0) load_ = mass / areas_.sum();
   rows_ = VertexRows(data.basis, data_indices_);
@@ -117,12 +117,13 @@ ContactSet::ContactSet(const ContactData& data, const Eigen::Vector3d& origin, d
 }
 
 void ContactSet::move(const VertexArray& positions, const VertexArray& velocities) {
-  rest_ = positions;
+  places_ = positions;
+  is_moved_ = true;
   rows_.set_one_mode(velocities);
-  if (rest_.rows() == 0) return;
-  reach_ = rest_.rowwise().norm().maxCoeff();
+  if (places_.rows() == 0) return;
+  reach_ = places_.rowwise().norm().maxCoeff();
   tree_.fit(velocities.rowwise().norm().maxCoeff(),
-            [this](int vertex, Eigen::AlignedBox3d& box) { box.extend(rest_.row(vertex).transpose()); });
+            [this](int vertex, Eigen::AlignedBox3d& box) { box.extend(places_.row(vertex).transpose()); });
 }
 
 ContactState ContactSet::make_state(std::size_t obstacle_count) const {
@@ -138,7 +139,7 @@ double ContactSet::travel_bound(const BodyPose& pose, const BodyVelocity& veloci
 Eigen::Vector3d ContactSet::place(int vertex, const AlignedArray& q) const noexcept {
   Eigen::RowVector3d moved;
   rows_.products(&vertex, 1, q, moved.data());
-  return (moved + rest_.row(vertex)).transpose();
+  return (moved + places_.row(vertex)).transpose();
 }
 
 bool ContactSet::may_meet(const PlacedObstacle& obstacle, const BodyPose& pose) const noexcept {
@@ -173,7 +174,7 @@ bool ContactSet::is_near(int node, const BodyPose& pose, double q_norm, double m
 }
 
 Eigen::Vector3d ContactSet::world_arm(int vertex, const BodyPose& pose) const noexcept {
-  const Eigen::Vector3d moved = rest_.row(vertex).transpose() + basis_rows(vertex).lazyProduct(pose.q);
+  const Eigen::Vector3d moved = places_.row(vertex).transpose() + basis_rows(vertex).lazyProduct(pose.q);
   return pose.rotation * moved;
 }
 
@@ -191,7 +192,7 @@ void ContactSet::set_products(const ContactWorkspace& workspace, Batch& batch) c
 /// world_arm() of one of a batch, x = q.
 Eigen::Vector3d ContactSet::arm_in(const Batch& batch, int index, const BodyPose& pose) const noexcept {
   const int vertex = batch.vertices[static_cast<std::size_t>(index)];
-  return pose.rotation * (rest_.row(vertex).transpose() + batch.products.col(index));
+  return pose.rotation * (places_.row(vertex).transpose() + batch.products.col(index));
 }
 
 /// The vertices of a batch that may meet obstacles; with q in workspace.x. Empties it.
@@ -301,7 +302,7 @@ void ContactSet::freeze_batch(const BodyPose& pose, const BodyVelocity& velocity
                    {point, predicted, heading, pose.position, load_, state.first_step}, areas_[candidate.vertex],
                    time_step, candidate);
     if (workspace.are_all_planes)
-      workspace.planes.set(number, rest(candidate.vertex), placed.plane->distance(candidate.carried),
+      workspace.planes.set(number, places_.row(candidate.vertex), placed.plane->distance(candidate.carried),
                            placed.obstacle->friction, candidate);
   }
   batch.count = 0;

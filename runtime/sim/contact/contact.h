@@ -121,7 +121,7 @@ class ContactSet {
   int data_index(int vertex) const noexcept { return data_indices_[static_cast<std::size_t>(vertex)]; }
 
   /// The vertices stand at `positions` [k x 3, m] in the frame of the body and go by `velocities` [k x 3, m/s],
-  /// whatever its modes are: from now on it has one, the way that they go, at q = 0.
+  /// whatever its modes are: from now on it has one, the way that they go, at q = 0. They rest where they did.
   void move(const VertexArray& positions, const VertexArray& velocities);
 
   /// Nothing touches.
@@ -178,8 +178,10 @@ class ContactSet {
                                  const BodyVelocity& velocity) const noexcept;
   Eigen::Vector3d rest(int vertex) const noexcept { return rest_.row(vertex); }  ///< frame of the body [m]
   const VertexArray& rest() const noexcept { return rest_; }                     ///< all vertices
-  double area(int vertex) const noexcept { return areas_[vertex]; }              ///< share of the surface [m^2]
-  double load() const noexcept { return load_; }  ///< mass over area [kg/m^2]; infinite: not known
+  bool is_moved() const noexcept { return is_moved_; }                           ///< by move()
+  const VertexArray& places() const noexcept { return places_; }     ///< those of all vertices at q = 0 [k x 3, m]
+  double area(int vertex) const noexcept { return areas_[vertex]; }  ///< share of the surface [m^2]
+  double load() const noexcept { return load_; }                     ///< mass over area [kg/m^2]; infinite: not known
   VertexRows::Rows basis_rows(int vertex) const noexcept { return rows_[vertex]; }  ///< 3 x r
 
   const DeformationTree& tree() const noexcept { return tree_; }  ///< its items are the vertices, in their order
@@ -209,12 +211,14 @@ class ContactSet {
                         Eigen::MatrixXd& stiffness) const noexcept;
 
   VertexArray rest_;                                       // k x 3, X
+  VertexArray places_;                                     // k x 3, X unless moved
   VertexRows rows_;                                        // of the basis
   Eigen::VectorXd areas_;                                  // k
   double load_ = std::numeric_limits<double>::infinity();  // [kg/m^2]
   std::vector<int> data_indices_, object_vertices_;
   DeformationTree tree_;
   double reach_ = 0;  // largest |X|
+  bool is_moved_ = false;
 };
 
 }  // namespace exmat::runtime

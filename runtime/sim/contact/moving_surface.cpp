@@ -11,6 +11,7 @@ MovingSurface::MovingSurface(const ContactSet& set, const TouchingSurface& touch
       velocities_(positions_),
       surface_positions_(VertexArray::Zero(touching.surface.vertices(), 3)),
       surface_velocities_(surface_positions_) {
+  touching_.drop_bounds();
   set_.move(positions_, velocities_);
   touching_.surface.move(surface_positions_, surface_velocities_);
   shape_ = touching_.surface.make_shape();

@@ -1,5 +1,6 @@
 #include "runtime/sim/contact/touching_surface.h"
 
+#include <algorithm>
 #include <limits>
 #include <utility>
 
@@ -21,10 +22,24 @@ TouchingSurface::TouchingSurface(const ContactSet& set, BodySurface of, bool mee
   approach_bounds = vertex_bounds.colwise().maxCoeff();
 }
 
+void TouchingSurface::drop_bounds() {
+  vertex_bounds.resize(0, 0);
+  approach_bounds.resize(0);
+}
+
 bool TouchingSurface::may_meet_itself(const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                                       double time_step) const noexcept {
-  if (approach_bounds.size() == 0) return false;
+  if (approach_bounds.size() == 0) return !places.empty();
   return approach_bounds.dot(q.cwiseAbs() + kContactMarginSteps * time_step * v.cwiseAbs()) >= 1;
+}
+
+bool TouchingSurface::may_meet_itself(int vertex, const ContactSet& set, const Eigen::VectorXd& q,
+                                      double way) const noexcept {
+  if (vertex_bounds.size() == 0) return true;
+  const auto bounds = vertex_bounds.row(vertex);
+  const double now = bounds.dot(q.cwiseAbs());
+  if (now >= 1 || way == 0) return now >= 1;
+  return now + std::max(set.tree().movement().most(bounds, way), surface.movement().most(bounds, way)) >= 1;
 }
 
 }  // namespace exmat::runtime

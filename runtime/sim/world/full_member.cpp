@@ -13,6 +13,7 @@ FullMember::FullMember(const FullModel& full, const Model& model, const StepScen
       surface_(*model.contact, touching),
       gradient_(Eigen::VectorXd::Zero(full.space.field_size())) {}
 
+/// By the body's frame; on bones, which move it in a frame that stands still, by where it is in the mean.
 void FullMember::place_surface() {
   const Placement frame = model_.frame->placement(state_.frame);
   const FrameVelocity moves = model_.frame->velocity(state_.frame);
@@ -20,12 +21,29 @@ void FullMember::place_surface() {
     return full_.rest.row(vertex).transpose() + full_displacement(full_, frame, *state_.full, vertex);
   };
   const auto velocity = [&](int vertex) { return full_velocity(full_, frame, moves, *state_.full, vertex); };
-  surface_.place(frame, position, velocity);
+  if (!full_.skin) return surface_.place(frame, moves, position, velocity);
+  Placement mean = frame;
+  FrameVelocity mean_moves;
+  const double share = 1 / static_cast<double>(full_.rest.rows());
+  for (int vertex = 0; vertex < full_.rest.rows(); ++vertex) {
+    mean.position += share * (position(vertex) - frame.position);
+    mean_moves.linear += share * velocity(vertex);
+  }
+  surface_.place(mean, mean_moves, position, velocity);
 }
 
 bool FullMember::begin(const StepScene& scene, double pushed) noexcept {
   step_.emplace(full_, model_, scene, state_, workspace_, own_);
   return step_->begin(/*touches_others=*/true, pushed);
+}
+
+void FullMember::drop_driven(BodyCandidates& candidates) const noexcept {
+  for (std::size_t i = 0; i < candidates.all.size(); ++i) {
+    bool is_free = false;
+    for (const bool is_vertex : {true, false})
+      for_places(candidates, i, is_vertex, [&](std::int32_t, double) { is_free = true; });
+    if (!is_free) candidates.all[i].stiffness = 0;
+  }
 }
 
 void FullMember::stay(Eigen::Ref<Eigen::VectorXd> d) noexcept {

@@ -396,11 +396,11 @@ void IslandProblem::multiply(const Eigen::VectorXd& x, Eigen::VectorXd& product)
       part.noalias() = own.near().newton.hessian.selfadjointView<Eigen::Lower>() * of(own);
     for (const auto& [index, side] : incidences_[i]) {
       const PairContact& pair = *pairs_[static_cast<std::size_t>(index)];
-      if (pair.is_own()) continue;
       if (in_full_space(pair)) {
         pair.add_product(side, own, part);
         continue;
       }
+      if (pair.is_own()) continue;
       const auto theirs = of(side == 0 ? second(pair) : first(pair));
       if (side == 0)
         part.noalias() += pair.coupling() * theirs;

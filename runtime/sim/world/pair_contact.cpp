@@ -55,16 +55,15 @@ void PairContact::gather(const ContactLaw& law, int side, const WorldBody& own, 
   const auto at = static_cast<std::size_t>(side);
   const std::vector<HeldBodyContact>& held = held_ != nullptr ? held_->held[at] : none;
   const BodyContact contact(half_);
-  NearVertices& near = near_[at];
-  if (own.full || other.full) {  // what has been found is of surfaces that move by q
-    near.radius = -1;
-    near.without = 1;
-  }
   CandidateSearch search{
-      own.scene().time_step, margin, own.state.contacts.first_step || other.state.contacts.first_step, held,
-      other.placed_shape(),  near};
+      own.scene().time_step, margin,   own.state.contacts.first_step || other.state.contacts.first_step, held,
+      other.placed_shape(),  near_[at]};
   search.gravity = own.scene().gravity.norm();
-  if (is_own()) return contact.gather_own(own.touching_body(), search, candidates_[at]);
+  if (is_own()) {
+    contact.gather_own(own.touching_body(), search, candidates_[at]);
+    if (own.full) own.full->drop_driven(candidates_[at]);
+    return;
+  }
   const TouchingBody its_own = own.touching_body(), its_other = other.touching_body();
   if (search.anew) {
     const bool is_first = side == 0;
@@ -238,13 +237,13 @@ void PairContact::set_coupling(const WorldBody& first, const Eigen::VectorXd& x_
 
 template <class Work>
 void PairContact::for_full(int side, const FullMember& member, const Work& work) const {
-  for (const bool is_vertex : {true, false}) {
-    const BodyCandidates& candidates = candidates_[static_cast<std::size_t>(is_vertex ? side : 1 - side)];
+  for_parts(side, [&](std::size_t at, bool is_vertex) {
+    const BodyCandidates& candidates = candidates_[at];
     for (std::size_t i = 0; i < candidates.all.size(); ++i)
       if (candidates.all[i].is_loaded())
         member.for_places(candidates, i, is_vertex,
                           [&](std::int32_t place, double share) { work(candidates.all[i], place, share); });
-  }
+  });
 }
 
 double PairContact::add_forces(int side, WorldBody& own) const {
@@ -282,12 +281,11 @@ void PairContact::set_ways(const WorldBody& first, const Eigen::Ref<const Eigen:
 }
 
 void PairContact::add_product(int side, const WorldBody& body, Eigen::Ref<Eigen::VectorXd> product) const {
-  for (std::size_t at = 0; at < 2; ++at) {
-    const bool is_vertex = static_cast<int>(at) == side;
+  for_parts(side, [&](std::size_t at, bool is_vertex) {
     if (!body.full) {  // what its own way does is in its Hessian
       const auto own = (is_vertex ? own_columns_[at] : other_columns_[at]).leftCols(used_[at]);
       product.noalias() += (is_vertex ? 1 : -1) * (own * ways_[at].row(is_vertex ? 1 : 0).transpose());
-      continue;
+      return;
     }
     for (Eigen::Index k = 0; k < used_[at]; ++k) {
       const auto& [direction, number] = directions_[at][static_cast<std::size_t>(k)];
@@ -295,7 +293,7 @@ void PairContact::add_product(int side, const WorldBody& body, Eigen::Ref<Eigen:
       body.full->for_places(candidates_[at], number, is_vertex,
                             [&](std::int32_t place, double share) { product.segment<3>(4 * place) += share * force; });
     }
-  }
+  });
 }
 
 void PairContact::refresh_friction(FrictionChange& change) noexcept {

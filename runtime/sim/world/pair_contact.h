@@ -130,6 +130,13 @@ class PairContact {
   void commit(const WorldBody& first, const WorldBody& second, HeldPair& held) const;
 
  private:
+  /// Calls work(at, is_vertex) for the candidates that a side's body is in, and its part in them: the vertex or y.
+  template <class Work>
+  void for_parts(int side, const Work& work) const {
+    const auto at = static_cast<std::size_t>(side);
+    work(at, /*is_vertex=*/true);
+    work(is_own() ? at : 1 - at, /*is_vertex=*/false);
+  }
   /// Calls work(candidate, place, share) for each vertex of a side's body that a loaded candidate pushes.
   template <class Work>
   void for_full(int side, const FullMember& member, const Work& work) const;

@@ -232,17 +232,12 @@ bool World::is_in_island(int body) const noexcept {
   return !island_of_.empty() && island_of_[static_cast<std::size_t>(body)] >= 0;
 }
 
-/// To touch other bodies does not ask for it, and where a body may touch itself, it steps in its modes, unless it hangs
-/// on bones.
+/// To touch other bodies, or itself, does not ask for it.
 bool World::asks_for_full(int body) {
   Member& own = at(body);
-  const State& state = *own.state;
   StepReport last = own.report;
   if (is_in_island(body)) last.contacts = 0;
-  const bool asks = asks_for_full_space(*own.kind.scene, last, *own.state);
-  const bool meets_itself =
-      asks && own.touching && own.touching->touching->may_meet_itself(state.q, state.v, own.kind.scene->time_step);
-  return asks && (!meets_itself || own.kind.full->skin);
+  return asks_for_full_space(*own.kind.scene, last, *own.state);
 }
 
 /// Puts each body into the space of its next step.
@@ -467,8 +462,9 @@ void World::find_pairs(int threads) {
         (near_.size() == others || near_.back() != link.bodies))
       near_.push_back(link.bodies);
   for (const int body : touching_) {
-    const WorldBody& own = touching(body);
-    if (own.touching->may_meet_itself(own.state.q, own.state.v, own.scene().time_step)) near_.emplace_back(body, body);
+    const TouchingBody own = touching(body).touching_body();
+    if (own.touching.may_meet_itself(own.pose.q, own.velocity.v, touching(body).scene().time_step))
+      near_.emplace_back(body, body);
   }
   if (near_.size() > others) std::ranges::sort(near_);
   keep_pairs();

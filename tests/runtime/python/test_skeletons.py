@@ -205,3 +205,37 @@ def test_a_joint_drives_the_weight_of_an_example(folder):
             exmat.Model.from_scene({**scene, "examples": {"stiffness": 1, "drivers": [{**driver, member: value}]}})
     with pytest.raises(exmat.BadInput, match="axis and angles, or rotation and radius"):
         exmat.Model.from_scene({**scene, "examples": {"stiffness": 1, "drivers": [{**driver, "radius": 1}]}})
+
+
+def folded(skinned, self_contact):
+    """The tube bent by 90 degrees at both joints, its tip then 0.7 m above the root, which both are 0.5 m thick on either side."""
+    world = exmat.World.from_scene({
+        "bodies": [{"name": "tube", "bundle": str(skinned)}], "time_step": 0.004, "damping": {"stiffness": 0.02},
+        "contact": {"stiffness": 1e8, "damping": 1e5, "self": self_contact}})
+    body = world[0]
+    for k in range(300):
+        angle, bones, place = np.radians(90) * min(1.0, k / 150), body.model.bound_bones.copy(), np.zeros(3)
+        for bone in range(3):
+            c, s = np.cos(bone * angle), np.sin(bone * angle)
+            bones[bone] = np.column_stack([[c, s, 0], [-s, c, 0], [0, 0, 1], place])
+            place = place + bones[bone, :, 0]
+        bones[2, 1, 3] -= 0.3 * np.clip((k - 150) / 100, 0, 1)
+        body.set_bones(bones)
+        assert world.step(1, threads=1).unconverged_islands == 0
+    return body, bones
+
+
+def test_flesh_does_not_go_through_flesh(skinned, held):
+    with h5py.File(skinned) as file:
+        tets, rest = file["/object/tets"][:], file["/object/vertices"][:]
+    root, tip = tets[(rest[tets, 0] < 0.8).all(1)], rest[:, 0] > 2.3
+    deep = []  # vertices of the tip more than a twentieth of a tet's height inside the root
+    for self_contact in (False, True):
+        body, bones = folded(skinned, self_contact)
+        assert off_bones(body, bones, held) < 1e-12 * LENGTH
+        xyz = body.positions(exmat.Points.all_vertices(body.model)).astype(float)
+        corners = xyz[root]
+        inverse = np.linalg.inv(np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2))
+        shares = np.einsum("tij,tkj->tki", inverse, xyz[tip] - corners[:, :1])
+        deep.append(int((np.minimum(shares.min(2), 1 - shares.sum(2)).max(0) > 0.05).sum()))
+    assert deep[0] > 5 and deep[1] == 0

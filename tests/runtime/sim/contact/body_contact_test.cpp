@@ -5,6 +5,7 @@
 #include <cmath>
 #include <gtest/gtest.h>
 
+#include "runtime/sim/contact/moving_surface.h"
 #include "tests/runtime/sim/world/fork.h"
 #include "tests/runtime/sim/world/touching_blocks.h"
 
@@ -290,10 +291,15 @@ TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidateOfABodyWithItself) {
   constexpr double kMargin = 1e-2;  // [m]
   constexpr int kSteps = 3000;
   SurfaceShape shape = touching.surface.make_shape();
-  NearVertices kept;
+  NearVertices kept, kept_moving;
   Eigen::VectorXd searched;
-  int searches = 0, served = 0;
+  int searches = 0, served = 0, served_moving = 0;
   std::size_t found = 0;
+  MovingSurface moving(set, touching);  // the same fork as one that does not move by its modes, turned and elsewhere
+  const RowMatrix& basis = fork.blocks.bar.basis();
+  const VertexArray& rest = fork.blocks.bar.model.object->mesh.vertices;
+  const Eigen::Matrix3d turn = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  const Placement elsewhere{Eigen::Vector3d::Zero(), {3, 4, 5}, turn};
   const Eigen::VectorXd sway = Eigen::VectorXd::Random(fork.blocks.model->modes());
   for (int step = 0; step < kSteps; ++step) {
     const double t = step / static_cast<double>(kSteps);
@@ -322,11 +328,27 @@ TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidateOfABodyWithItself) {
       ASSERT_EQ(with.all[i].vertex, all[i]) << step;
       ASSERT_EQ(with.all[i].rest, without.all[i].rest) << step;
     }
+    const auto position = [&](int vertex) -> Eigen::Vector3d {
+      const Eigen::Vector3d place = rest.row(vertex).transpose() + basis.middleRows<3>(3 * vertex) * q;
+      return elsewhere.position + turn * place;
+    };
+    const FrameVelocity spin{{1, 2, 3}, {4, 5, 6}};
+    moving.place(elsewhere, spin, position,
+                 [&](int vertex) -> Eigen::Vector3d { return spin.at(position(vertex) - elsewhere.position); });
+    BodyCandidates by_vertices;
+    contact.gather_own(moving.touching(), {1e-3, kMargin, false, {}, moving.shape(), kept_moving}, by_vertices);
+    if (kept_moving.radius >= 0 && kept_moving.served > 1) ++served_moving;
+    ASSERT_EQ(by_vertices.all.size(), all.size()) << step;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      ASSERT_EQ(by_vertices.all[i].vertex, all[i]) << step;
+      ASSERT_LT((by_vertices.all[i].normal - turn * without.all[i].normal).norm(), 1e-9) << step;
+    }
     found += all.size();
   }
   EXPECT_GT(found, 500U);
   EXPECT_LT(searches, kSteps / 2);
   EXPECT_GT(served, kSteps / 2);
+  EXPECT_GT(served_moving, kSteps / 2);
 }
 
 }  // namespace body_contact_test

@@ -55,7 +55,7 @@ TEST(BodySurface, SignedDistanceIsThatOfAllTrianglesAndTheWindingNumber) {
       // Its material point is where it says.
       RowMatrix rows(3, q.size());
       body.surface.basis_of(*hit, rows);
-      const Eigen::Vector3d point = body.surface.rest_of(*hit) + rows * q;
+      const Eigen::Vector3d point = body.surface.place_of(*hit) + rows * q;
       EXPECT_NEAR((p - point - hit->distance * hit->normal).norm(), 0, 1e-9);
       // Nothing is found nearer than it is.
       EXPECT_FALSE(body.surface.nearest(p, 0.999 * std::abs(hit->distance), shape));

@@ -22,7 +22,7 @@ Meeting in_parts(Meeting meeting) {
 }
 
 /// A spring at a corner of the first, whose frame its host moves by `way` in a step.
-void hold_corner(const test::MeetingBlocks& blocks, const Eigen::Vector3d& way, World& world) {
+void hold_corner(const test::FullBlocks& blocks, const Eigen::Vector3d& way, World& world) {
   State& state = world.state(0);
   state.attachments.push_back(test::held_vertex(*blocks.model, blocks.bar, state, 0, AttachmentKind::kSpring));
   state.attachments[0].stiffness = 2e4;
@@ -50,7 +50,7 @@ void expect_same(const World& divided, const World& parts) {
 // A step of 1/60 s in four parts is four steps of 1/240 s, with what they remember of their contacts.
 TEST(DividedSteps, AreAsManySmallerSteps) {
   for (const Meeting& meeting : {kFlush, kBeside}) {
-    const test::MeetingBlocks blocks = test::meeting_blocks(meeting), finer = test::meeting_blocks(in_parts(meeting));
+    const test::FullBlocks blocks = test::meeting_blocks(meeting), finer = test::meeting_blocks(in_parts(meeting));
     World world = test::meeting_world(blocks, meeting), parts = test::meeting_world(finer, in_parts(meeting));
     const WorldReport report = world.step(1);
     ASSERT_EQ(report.divided_islands, 1);
@@ -71,7 +71,7 @@ TEST(DividedSteps, AreAsManySmallerSteps) {
 
 // The frame is a fourth of its way farther in each part.
 TEST(DividedSteps, TakeFramesOfAHostAlong) {
-  const test::MeetingBlocks blocks = test::meeting_blocks(kFlush), finer = test::meeting_blocks(in_parts(kFlush));
+  const test::FullBlocks blocks = test::meeting_blocks(kFlush), finer = test::meeting_blocks(in_parts(kFlush));
   World world = test::meeting_world(blocks, kFlush), parts = test::meeting_world(finer, in_parts(kFlush));
   const Eigen::Vector3d way(0.1, 0.2, -0.05);
   hold_corner(blocks, way, world);
@@ -138,7 +138,7 @@ TEST(DividedSteps, AreTakenBySingleBodies) {
 
 // Whoever bounds the iterations has no time for more of them.
 TEST(DividedSteps, AreNotTakenWhereIterationsAreBounded) {
-  test::MeetingBlocks blocks = test::meeting_blocks(kFlush);
+  test::FullBlocks blocks = test::meeting_blocks(kFlush);
   blocks.scene.newton.max_iterations = NewtonSettings{}.max_iterations - 1;
   World world = test::meeting_world(blocks, kFlush);
   const WorldReport report = world.step(1);

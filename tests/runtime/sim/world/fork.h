@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "tests/runtime/sim/world/touching_blocks.h"
@@ -27,9 +28,9 @@ struct Fork {
       if (std::abs(rest(v, 2) - 0.08) < 1e-9) below.push_back(v);
       if (std::abs(rest(v, 2) - 0.16) < 1e-9) above.push_back(v);
     }
-    // The mode that brings the ends of the prongs together most.
+    // Of the lowest modes that which brings the ends of the prongs together most.
     Eigen::Index best = 0;
-    for (Eigen::Index j = 0; j < blocks.model->modes(); ++j)
+    for (Eigen::Index j = 0; j < std::min<Eigen::Index>(12, blocks.model->modes()); ++j)
       if (std::abs(closing(j)) > std::abs(closing(best))) best = j;
     mode = best;
   }
@@ -37,21 +38,27 @@ struct Fork {
   double closing(Eigen::Index j) const {
     return blocks.bar.basis()(3 * below.front() + 2, j) - blocks.bar.basis()(3 * above.front() + 2, j);
   }
-  /// Gap between the ends of the prongs, negative where they overlap [m].
-  double gap(const Eigen::VectorXd& q) const {
-    double sum = 0.08;
-    for (Eigen::Index j = 0; j < q.size(); ++j) sum -= closing(j) * q[j];
-    return sum;
+  /// Displacement of a vertex, of a fork that is clamped [m].
+  Eigen::Vector3d displacement(const State& state, Eigen::Index vertex) const {
+    if (state.full) return full_displacement(*blocks.full, Placement(), *state.full, vertex);
+    return blocks.bar.basis().middleRows<3>(3 * vertex) * state.q;
+  }
+  /// Gap between the ends of its prongs, negative where they overlap [m].
+  double gap(const State& state) const {
+    return 0.08 + displacement(state, above.front()).z() - displacement(state, below.front()).z();
   }
   /// At a gap [m] that closes at a speed [m/s].
-  WorldBodyStart closed_to(double gap, double speed, const Eigen::Vector3d& spin = Eigen::Vector3d::Zero()) const {
+  WorldBodyStart closed_to(double gap, double speed, const Eigen::Vector3d& spin = Eigen::Vector3d::Zero(),
+                           bool in_full_space = false) const {
     const Eigen::VectorXd closed = Eigen::VectorXd::Unit(blocks.model->modes(), mode) / closing(mode);
     State state = make_state(*blocks.model, (0.08 - gap) * closed, speed * closed);
     set_motion(*blocks.model, {.angular_velocity = spin}, state);
-    return {{blocks.model.get(), &blocks.scene, blocks.surface}, std::move(state)};
+    WorldBodyStart start{{blocks.model.get(), &blocks.scene, blocks.surface}, std::move(state)};
+    if (in_full_space) blocks.put_in_full_space(start);
+    return start;
   }
 
-  Blocks blocks;
+  FullBlocks blocks;
   std::vector<Eigen::Index> below, above;
   Eigen::Index mode = 0;
 };

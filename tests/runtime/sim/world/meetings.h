@@ -6,7 +6,6 @@
 #include <random>
 #include <vector>
 
-#include "runtime/sim/space/full/full_body.h"
 #include "tests/runtime/sim/world/touching_blocks.h"
 
 namespace exmat::runtime::test {
@@ -43,17 +42,7 @@ struct MeetingResult {
   int steps = 0, touching = 0, non_finite = 0, unconverged = 0;
 };
 
-struct MeetingBlocks : Blocks {
-  MeetingBlocks(double time_step, const exmat::test::BarOptions& options) : Blocks(time_step, options) {
-    full = std::move(build_full_model(bar.model, *model).model);
-    full_scene = scene;
-    full_scene.space.space = Space::kFull;
-  }
-  std::unique_ptr<const FullModel> full;
-  StepScene full_scene;
-};
-
-inline MeetingBlocks meeting_blocks(const Meeting& meeting) {
+inline FullBlocks meeting_blocks(const Meeting& meeting) {
   exmat::test::BarOptions options = kMeetingBodies[static_cast<std::size_t>(meeting.bodies)];
   options.youngs_modulus = meeting.youngs_modulus;
   return {meeting.time_step, options};
@@ -64,28 +53,18 @@ inline ContactLaw law_of(const Meeting& meeting) {
                         : ContactLaw{meeting.stiffness, 0, 0};
 }
 
-/// So many of the bodies step in all vertices.
-inline void put_in_full_space(const MeetingBlocks& blocks, int count, std::vector<WorldBodyStart>& bodies) {
-  for (int i = 0; i < count; ++i) {
-    auto& [kind, state] = bodies[static_cast<std::size_t>(i)];
-    kind.scene = &blocks.full_scene;
-    kind.full = blocks.full.get();
-    prepare_full(*blocks.full, state);
-  }
-}
-
-inline World meeting_world(const MeetingBlocks& blocks, const Meeting& meeting) {
+inline World meeting_world(const FullBlocks& blocks, const Meeting& meeting) {
   const auto& [offset, angle] = kMeetingStarts[static_cast<std::size_t>(meeting.start)];
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(angle, Eigen::Vector3d(1, 2, 0.5).normalized()));
   std::vector<WorldBodyStart> bodies;
   bodies.push_back(blocks.body({0, 0, 0}, {meeting.speed, 0, 0}));
   bodies.push_back(blocks.body(offset, {-meeting.speed, 0, 0}, Eigen::Vector3d::Zero(), turn));
-  put_in_full_space(blocks, meeting.full, bodies);
+  for (int i = 0; i < meeting.full; ++i) blocks.put_in_full_space(bodies[static_cast<std::size_t>(i)]);
   return World(std::move(bodies), law_of(meeting));
 }
 
 /// Until either would have gone three lengths by itself, at least 20 steps.
-inline MeetingResult meet(const MeetingBlocks& blocks, const Meeting& meeting) {
+inline MeetingResult meet(const FullBlocks& blocks, const Meeting& meeting) {
   World world = meeting_world(blocks, meeting);
   MeetingResult result;
   const Momenta before = momenta(blocks, world);

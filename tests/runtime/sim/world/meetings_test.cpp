@@ -60,7 +60,7 @@ TEST(Meetings, NoneOfThoseThatGainedDoes) {
 // It ended with 1.09 times its energy: an obstacle near by, which pushes nothing, is no reason to leave it that.
 TEST(Meetings, NoneGainsEnergyBesideAnObstacle) {
   const Meeting meeting{1e3, 50, 1e9, 1.0 / 60, true, 1, 2};
-  test::MeetingBlocks blocks = test::meeting_blocks(meeting);
+  test::FullBlocks blocks = test::meeting_blocks(meeting);
   blocks.scene.obstacles.push_back(Obstacle{Plane{{0, 0, -2}, Eigen::Vector3d::UnitZ()}, RigidMotion(), 1e6, 0, 0});
   EXPECT_LE(test::meet(blocks, meeting).peak, 1 + kGain);
 }
@@ -77,7 +77,7 @@ TEST(Meetings, NoneGainsEnergyPressedAgainstAnObstacle) {
 TEST(Meetings, GoOnFromTheirMemoryToTheLastBit) {
   for (const int full : {0, 1, 2}) {
     const Meeting meeting{1e4, 5, 1e9, 1.0 / 60, true, 1, 2, full};
-    const test::MeetingBlocks blocks = test::meeting_blocks(meeting);
+    const test::FullBlocks blocks = test::meeting_blocks(meeting);
     World world = test::meeting_world(blocks, meeting);
     for (int i = 0; i < 8; ++i) world.step(1);
     ASSERT_EQ(world.held().size(), 1U);
@@ -124,10 +124,10 @@ TEST(Meetings, WhatOverflowsIsReported) {
     for (const auto& [stiffness, full] : {std::pair(5e-324, 0), std::pair(1e7, 0), std::pair(1e300, 0),
                                           std::pair(5e-324, 2), std::pair(1e7, 1), std::pair(1e300, 3)}) {
       SCOPED_TRACE(testing::Message() << speed << " m/s, " << stiffness << " N/m^3, " << full << " in full space");
-      const test::MeetingBlocks blocks(1e-3, test::Blocks::free_block());
+      const test::FullBlocks blocks(1e-3, test::Blocks::free_block());
       std::vector<WorldBodyStart> bodies{blocks.body({0, 0, 0}, {speed, 0, 0}), blocks.body({0.45, 0.02, 0}),
                                          blocks.body({0, 0.15, 0.05})};
-      test::put_in_full_space(blocks, full, bodies);
+      for (int i = 0; i < full; ++i) blocks.put_in_full_space(bodies[static_cast<std::size_t>(i)]);
       World world(std::move(bodies), {stiffness, 0, 0.5});
       for (int i = 0; i < 3; ++i) {
         world.step(1);

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "runtime/sim/space/full/full_body.h"
 #include "runtime/sim/world/world.h"
 #include "tests/support/synthetic_model.h"
 
@@ -58,6 +59,23 @@ struct Blocks {
   std::unique_ptr<const Model> model;
   StepScene scene;
   std::shared_ptr<const TouchingSurface> surface;
+};
+
+/// Blocks that may step in all vertices.
+struct FullBlocks : Blocks {
+  FullBlocks(double time_step, const exmat::test::BarOptions& options, bool meets_itself = false)
+      : Blocks(time_step, options, meets_itself) {
+    full = std::move(build_full_model(bar.model, *model).model);
+    full_scene = scene;
+    full_scene.space.space = Space::kFull;
+  }
+  void put_in_full_space(WorldBodyStart& body) const {
+    body.kind.scene = &full_scene;
+    body.kind.full = full.get();
+    prepare_full(*full, body.state);
+  }
+  std::unique_ptr<const FullModel> full;
+  StepScene full_scene;
 };
 
 struct Momenta {
