@@ -107,6 +107,12 @@ class FullPotential {
   enum class Tangents { kNone, kExact, kProjected };
   /// Elements at d, and tangents there; `freeze`: those of damping as well, before damping is evaluated.
   void evaluate_elements(const Eigen::VectorXd& d, Tangents tangents, bool freeze) noexcept;
+  /// Of a free body: damping takes off the rigid motion of the body at d from now on. Far from where it was frozen the
+  /// gradient, whose forces of damping have no torque where the body is, is not that of the potential.
+  void place_frame(const Eigen::VectorXd& d) noexcept {
+    workspace_.turned = workspace_.start + d;
+    model_.rigid->place(workspace_.turned.data(), workspace_.rigid);
+  }
   /// The gradient at the d of the last evaluate_elements(), with the target as it is now.
   PotentialEvaluation gradient_there(const Eigen::VectorXd& d, Eigen::VectorXd& gradient) noexcept;
 

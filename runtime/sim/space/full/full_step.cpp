@@ -10,6 +10,7 @@ namespace {
 
 constexpr double kMostPredicted = 0.5;  // of an edge, that an unchecked predictor moves a vertex by
 constexpr double kSlow = 0.1;           // of the residual: tangents that leave more are evaluated again
+constexpr int kFarFromFrozen = 12;      // iterations of a free body, after which its frame is that of where it is
 constexpr int kContactIterations = 60;  // of conjugate gradients near obstacles, at most
 constexpr double kLongStep = 0.008;     // [s]
 constexpr double kDelicate = 0.1;       // of the accuracy, in long steps and without damping of stiffness
@@ -89,7 +90,7 @@ const char* unsupported(const FullModel& model, const StepScene& scene) noexcept
     if (elastic_factor(scene.examples[group]) == 0) continue;
     if (!model.examples[group].is_elastic)
       return "an elastic example force, since the bundle was made for a linear one";
-    if (model.skin || model.rigid) return "an elastic example force of a free body or one on a skeleton";
+    if (model.skin) return "an elastic example force of a body on a skeleton";
   }
   const bool damped = scene.mass_damping > 0 || scene.stiffness_damping > 0;
   if (!model.space.is_clamped() && !model.rigid && (damped || acts_example))
@@ -590,8 +591,12 @@ NewtonStatus FullStep::minimise() noexcept {
     }
     projected_ = false;
     tangents_are_current_ = true;
+    const bool is_far = model_.rigid && report_.newton_iterations >= kFarFromFrozen;
+    if (is_far) potential_.place_frame(work.d);
     potential_.evaluate_elements(work.d, FullPotential::Tangents::kExact, false);
-    if (!moved) here_ = potential_.gradient_there(work.d, work.gradient);
+    if (moved && !is_far) continue;
+    here_ = potential_.gradient_there(work.d, work.gradient);
+    report_.residual = work.gradient.norm();
   }
 }
 
