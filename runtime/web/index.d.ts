@@ -192,6 +192,12 @@ export class Body implements Owner {
   /** Adds forces [3k] [N] that stay until they are cleared. */
   applyForces(points: Points, forces: Numbers): void;
   clearForces(): void;
+  /** Adds forces [3k] [N] that can be changed and removed while all others stay to the last bit; their id. */
+  addForces(points: Points, forces: Numbers): number;
+  /** Puts forces [3k] [N] in place of those that had the id. */
+  setForces(id: number, points: Points, forces: Numbers): void;
+  /** The body then is as if it had never got the forces of this id. */
+  removeForces(id: number): void;
   restartIntegrator(): void;
   setGravity(gravity: Numbers): void;
   setDamping(mass: number, stiffness: number): void;

@@ -269,6 +269,17 @@ export class Body extends Owner {
     this.module.lend(numbers, (address) => this.module.call("body_apply_forces", this.handle, points.handle, address, BigInt(numbers.length)));
   }
   clearForces() { this.module.call("body_clear_forces", this.handle); }
+  /** The id of forces that can be changed and removed while all others stay. */
+  addForces(points, forces) {
+    const numbers = doubles(forces);
+    return this.module.lend(numbers, (address) =>
+      Number(this.module.integer64("body_add_forces", this.handle, points.handle, address, BigInt(numbers.length))));
+  }
+  setForces(id, points, forces) {
+    const numbers = doubles(forces);
+    this.module.lend(numbers, (address) => this.module.call("body_set_forces", this.handle, whole(id, "id"), points.handle, address, BigInt(numbers.length)));
+  }
+  removeForces(id) { this.module.call("body_remove_forces", this.handle, whole(id, "id")); }
   restartIntegrator() { this.module.call("body_restart_integrator", this.handle); }
   setGravity(gravity) { this.module.lend(doubles(gravity), (address) => this.module.call("body_set_gravity", this.handle, address)); }
   setDamping(mass, stiffness) { this.module.call("body_set_damping", this.handle, mass, stiffness); }

@@ -452,6 +452,10 @@ class Calls {
         checked(choices_.one_in(4) ? exmat_body_apply_impulses(one, at, forces.data(), choices_.length(count))
                                    : exmat_body_apply_forces(one, at, forces.data(), choices_.length(count)));
         if (count == 3) checked(exmat_body_reach(one, at, forces.data(), count, nullptr));
+        std::int64_t id = choices_.whole();
+        if (choices_.one_in(2)) checked(exmat_body_add_forces(one, at, forces.data(), choices_.length(count), &id));
+        if (choices_.one_in(2)) checked(exmat_body_set_forces(one, id, at, forces.data(), choices_.length(count)));
+        if (choices_.one_in(2)) checked(exmat_body_remove_forces(one, choices_.one_in(2) ? id : choices_.whole()));
         return;
       }
       case 3:

@@ -67,6 +67,22 @@ test("forces, weights and energies", async () => {
   model.free();
 });
 
+test("forces that were removed or changed leave the bits of those that were given so", async () => {
+  const model = await files.load(pack, settings);
+  const body = new model.Body(), given = new model.Body(), never = new model.Body(), tip = model.points([model.vertices - 1]);
+  for (const each of [body, given, never]) each.applyForces(tip, [0.1, 0.2, 0.3]);
+  const id = body.addForces(tip, [3e5, 1e5, 0]);
+  body.setForces(id, tip, [0, 2, 1]);
+  given.applyForces(tip, [0, 2, 1]);
+  assert.equal(body.step(20).hash, given.step(20).hash);
+  body.state = never.state;
+  assert.throws(() => body.removeForces(id), files.InvalidArgument);
+  body.removeForces(body.addForces(tip, [3e5, 1e5, 0]));
+  assert.equal(body.step(20).hash, never.step(20).hash);
+  assert.throws(() => body.setForces(0.5, tip, [0, 0, 1]), files.InvalidArgument);
+  model.free();
+});
+
 test("a batch steps as its bodies do", async () => {
   const model = await files.load(pack, settings);
   const batch = new model.Batch(16), body = new model.Body();

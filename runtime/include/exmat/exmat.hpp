@@ -341,6 +341,16 @@ class BodyRef {
     check(exmat_body_apply_forces(get(), points.get(), forces.data(), detail::length(forces)));
   }
   void clear_forces() { check(exmat_body_clear_forces(get())); }
+  /// Forces [3k] that can be changed and removed: their id.
+  std::int64_t add_forces(const Points& points, std::span<const double> forces) {
+    std::int64_t id = -1;
+    check(exmat_body_add_forces(get(), points.get(), forces.data(), detail::length(forces), &id));
+    return id;
+  }
+  void set_forces(std::int64_t id, const Points& points, std::span<const double> forces) {
+    check(exmat_body_set_forces(get(), id, points.get(), forces.data(), detail::length(forces)));
+  }
+  void remove_forces(std::int64_t id) { check(exmat_body_remove_forces(get(), id)); }
   void restart_integrator() { check(exmat_body_restart_integrator(get())); }
 
   exmat_motion motion() const {

@@ -13,6 +13,9 @@ export async function use(element: HTMLElement): Promise<number> {
   const id: number = body.attach([1, 2], new Float64Array(12), { kind: "spring", stiffness: 1e3 });
   const tie: number = body.attachTo([1], body, [2], { kind: "ball", breakForce: 10 + id });
   body.detach(tie);
+  const push: number = body.addForces(hero.points([1]), [0, 0, 1]);
+  body.setForces(push, hero.points([1]), new Float64Array(3));
+  body.removeForces(push);
   const { force, broken }: { force: number[]; broken: boolean } = body.attachmentLoad(id);
   body.setBones(hero.animatedBones(0, 0.5), { teleport: !broken });
   const surface: Surface = hero.surface("render"), hand = new Hand(body, surface, 0, [1, 0, 0]);
