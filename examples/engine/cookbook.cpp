@@ -324,8 +324,8 @@ int main(int argc, char** argv) {
     const std::uint64_t saved = world.hash();
 
     const Vector eye{3.8, 0.5, 10}, down{0, 0, -1};
-    const std::optional<exmat::RayHit> picked = world.body(upper).cast_ray(drawn.surface, eye, down);
-    if (!picked) throw exmat::Error(EXMAT_FAILURE, "the ray meets nothing");
+    const std::optional<exmat::RayHit> picked = world.cast_ray(std::array{&std::as_const(drawn.surface)}, eye, down);
+    if (!picked || picked->body != upper) throw exmat::Error(EXMAT_FAILURE, "the ray does not meet the upper body");
     Hand hand(drawn.surface, *picked);
     const Vector mouse{3.8, 0.5, 10 - picked->distance + 0.5};
     frames(30, [&] { hand.pull(world.body(upper), mouse); });

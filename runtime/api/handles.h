@@ -9,6 +9,7 @@
 #include "exmat/exmat.h"
 #include "runtime/api/applied_forces.h"
 #include "runtime/api/contact_record.h"
+#include "runtime/api/deformed_box.h"
 #include "runtime/api/drawn_surface.h"
 #include "runtime/api/point_set.h"
 #include "runtime/capacity/load_capacity.h"
@@ -48,6 +49,7 @@ struct exmat_shape {
 struct exmat_surface {
   exmat_points points;
   exmat::runtime::ModelSurface drawn;
+  exmat::runtime::DeformedBox box;  ///< of its points
 };
 
 struct exmat_matrix {

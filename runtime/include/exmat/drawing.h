@@ -74,6 +74,24 @@ EXMAT_API exmat_status exmat_body_cast_ray(const exmat_body* body, const exmat_s
                                            const double* direction, double most, int64_t* triangle, double* shares,
                                            double* distance, double* normal) EXMAT_NOEXCEPT;
 
+/* A place of a surface of a body that a ray meets. */
+typedef struct exmat_ray_hit {
+  size_t size;      /* sizeof(exmat_ray_hit), set by the caller */
+  int64_t body;     /* its id in the world; -1: the ray meets nothing, and nothing else is told */
+  int64_t surface;  /* the number of its surface among those that were given */
+  int64_t triangle; /* of that surface */
+  double shares[3]; /* of the triangle's corners, sum 1, as exmat_points_create_on_surface() takes them */
+  double distance;  /* from the origin of the ray [m] */
+  double normal[3]; /* unit, outward */
+} exmat_ray_hit;
+
+/* The first triangle of all bodies of the world, as they are now, that a ray meets, as exmat_body_cast_ray(). Bodies
+   have those of `surfaces` [count] that are of their model; others, and obstacles, are not seen. A body in its modes
+   takes r operations where the ray misses the box about all that its modes reach, or something is nearer. Allocates. */
+EXMAT_API exmat_status exmat_world_cast_ray(const exmat_world* world, const exmat_surface* const* surfaces,
+                                            int64_t count, const double* origin, const double* direction, double most,
+                                            exmat_ray_hit* hit) EXMAT_NOEXCEPT;
+
 /* The places of the s cubature elements, of tets their centroids and of rings their vertices, and how many each stands
    for: `weights` [count = s], or NULL. */
 EXMAT_API int64_t exmat_model_elements(const exmat_model* model) EXMAT_NOEXCEPT; /* s */

@@ -104,6 +104,8 @@ struct RayHit {
   std::array<double, 3> shares{};  ///< of its corners, sum 1, as Points::on_surface() takes them
   double distance = 0;             ///< [m]
   std::array<double, 3> normal{};  ///< outward, of length 1
+  std::int64_t body = -1;          ///< of a ray through a world: the id of the body that it meets
+  std::int64_t surface = 0;        ///< likewise: the number of its surface among those that were given
 };
 
 /// A square sparse matrix: row i has the entries from starts[i] to starts[i + 1], their columns ascending.
