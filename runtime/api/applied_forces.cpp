@@ -68,7 +68,7 @@ void add_vertex_forces(const PointSet& points, const double* forces, const FullS
         sum.segment<3>(3 * number) += points.shares(i, c) * Eigen::Map<const Eigen::Vector3d>(forces + 3 * i);
 }
 
-/// To these sums, or, null, to those of the state.
+/// Adds them to these sums, or, where `to` is null, to those of the state.
 void add_forces(const GivenForces& given, exmat_body& body, AppliedForces* to) noexcept {
   State& state = body.state;
   (to != nullptr ? to->modes : state.applied_force) += body.force;
@@ -103,7 +103,7 @@ AppliedForces applied_sums(const exmat_body& body) {
   return sums;
 }
 
-/// Makes those of the state again.
+/// Makes the sums of the state of all forces again.
 void sum_forces(exmat_body& body) noexcept {
   clear_applied(body);
   for (const AppliedForces& forces : body.forces) {

@@ -45,7 +45,7 @@ Hit first_hit(const TriangleArray& triangles, const std::vector<double>& xyz, co
   return first;
 }
 
-/// Numbers of a caller, whose checks have passed.
+/// Checks and reads a caller's ray.
 exmat_status read_ray(const char* function, const double* origin, const double* direction, double most,
                       Ray& ray) noexcept {
   if (origin == nullptr) return null_argument(function, "origin");
@@ -59,7 +59,7 @@ exmat_status read_ray(const char* function, const double* origin, const double* 
   return EXMAT_OK;
 }
 
-/// The surface, of the same model, where the body is now. `xyz` is scratch.
+/// Casts the ray through a surface of the body, where it is now. `xyz` is scratch.
 Hit first_hit(const exmat_body& body, const exmat_surface& surface, const Ray& ray, double most,
               std::vector<double>& xyz) {
   const PointSet& points = surface.points.set;
@@ -70,8 +70,8 @@ Hit first_hit(const exmat_body& body, const exmat_surface& surface, const Ray& r
   return first_hit(surface.drawn.triangles, xyz, ray, most);
 }
 
-/// Where the ray enters the box about the surface: no hit is nearer [m]. None where it misses the box; 0 of a body in
-/// all its vertices, which has none.
+/// Distance at which the ray enters the box about the surface: no hit is nearer [m]. None where it misses the box; 0 of
+/// a body in all its vertices, which has none.
 std::optional<double> nearest_possible(const exmat_body& body, const exmat_surface& surface, const Ray& ray) noexcept {
   if (body.state.full) return 0;
   const Placement placement = body.model().frame->placement(body.state.frame);

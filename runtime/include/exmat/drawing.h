@@ -69,7 +69,8 @@ EXMAT_API exmat_status exmat_points_create_on_surface(const exmat_surface* surfa
 /* The first triangle of the surface of a body, as it is now, that a ray from `origin` [3] [m] along `direction` [3], of
    any length but 0, meets within `most` [m], from either side: its number, -1 where there is none; the `shares` [3] of
    its corners, as exmat_points_create_on_surface() takes them; the `distance` from the origin [m]; and the unit
-   `normal` [3], outward. All but `triangle` may be NULL. It takes the time of exmat_body_read_positions_double(). */
+   `normal` [3], outward. All but `triangle` may be NULL. It takes the time of exmat_body_read_positions_double(), and
+   allocates. */
 EXMAT_API exmat_status exmat_body_cast_ray(const exmat_body* body, const exmat_surface* surface, const double* origin,
                                            const double* direction, double most, int64_t* triangle, double* shares,
                                            double* distance, double* normal) EXMAT_NOEXCEPT;
