@@ -8,6 +8,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 using Vector = std::array<double, 3>;
@@ -121,12 +122,16 @@ class Hand {
     body.read_positions(points_, xyz);
     std::array<double, 3> force;
     for (std::size_t axis = 0; axis < 3; ++axis) force[axis] = stiffness_ * (mouse[axis] - xyz[axis]);
-    body.clear_forces();
-    body.apply_forces(points_, force);
+    if (id_ < 0)
+      id_ = body.add_forces(points_, force);
+    else
+      body.set_forces(id_, points_, force);
   }
+  void release(exmat::BodyRef body) { body.remove_forces(std::exchange(id_, -1)); }
 
  private:
   exmat::Points points_;
+  std::int64_t id_ = -1;      // of its force on the body
   double stiffness_ = 30000;  // [N/m]
 };
 
@@ -319,15 +324,15 @@ int main(int argc, char** argv) {
     const std::uint64_t saved = world.hash();
 
     const Vector eye{3.8, 0.5, 10}, down{0, 0, -1};
-    const std::optional<exmat::RayHit> picked = world.body(upper).cast_ray(drawn.surface, eye, down);
-    if (!picked) throw exmat::Error(EXMAT_FAILURE, "the ray meets nothing");
+    const std::optional<exmat::RayHit> picked = world.cast_ray(std::array{&std::as_const(drawn.surface)}, eye, down);
+    if (!picked || picked->body != upper) throw exmat::Error(EXMAT_FAILURE, "the ray does not meet the upper body");
     Hand hand(drawn.surface, *picked);
     const Vector mouse{3.8, 0.5, 10 - picked->distance + 0.5};
     frames(30, [&] { hand.pull(world.body(upper), mouse); });
     const double before = picked->distance,
                  after = world.body(upper).cast_ray(drawn.surface, eye, down).value_or(*picked).distance;
     std::printf("pulled       the picked point up by %.2f m\n", before - after);
-    world.body(upper).clear_forces();
+    hand.release(world.body(upper));
 
     take_pose(world.body(upper), model, 1);
     frames(20, [] {});

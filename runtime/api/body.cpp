@@ -17,6 +17,7 @@ void put_to_start(exmat_body& body) noexcept {
   body.state = body.start;  // vectors of the same lengths, but perhaps attachments: no allocation
   if (body.full() != nullptr) put_by_shifts(*body.full(), body.scene, body.state);
   body.load.setZero();
+  body.forces.clear();
   begin_steps(body);
   was_put(body);
 }
@@ -35,23 +36,6 @@ Eigen::Vector3d full_position(const PointSet& points, Eigen::Index i, const Plac
   return position;
 }
 
-/// World position [m] of a point that has rows of the basis.
-Eigen::Vector3d position(const PointSet& points, Eigen::Index i, const exmat_body& body,
-                         const Placement& placement) noexcept {
-  if (body.state.full) return full_position(points, i, placement, body);
-  const Eigen::Vector3d displacement = points.basis_rows.middleRows<3>(3 * i).lazyProduct(body.state.q);
-  return placement.to_world(points.rest.row(i).transpose() + displacement);
-}
-
-/// [f] of world forces [3k] on the points.
-void add_vertex_forces(const PointSet& points, const double* forces, const FullSpace& space,
-                       Eigen::VectorXd& sum) noexcept {
-  for (Eigen::Index i = 0; i < points.corners.rows(); ++i)
-    for (Eigen::Index c = 0; c < points.corners.cols(); ++c)
-      if (const std::int32_t number = space.number(points.corners(i, c)); number >= 0)
-        sum.segment<3>(3 * number) += points.shares(i, c) * Eigen::Map<const Eigen::Vector3d>(forces + 3 * i);
-}
-
 void put_to_rest(exmat_body& body) noexcept {
   const double time = body.state.time;
   put_to_start(body);
@@ -59,6 +43,17 @@ void put_to_rest(exmat_body& body) noexcept {
 }
 
 }  // namespace
+
+namespace exmat::runtime {
+
+Eigen::Vector3d world_position(const PointSet& points, Eigen::Index i, const exmat_body& body,
+                               const Placement& placement) noexcept {
+  if (body.state.full) return full_position(points, i, placement, body);
+  const Eigen::Vector3d displacement = points.basis_rows.middleRows<3>(3 * i).lazyProduct(body.state.q);
+  return placement.to_world(points.rest.row(i).transpose() + displacement);
+}
+
+}  // namespace exmat::runtime
 
 exmat_body::exmat_body(std::shared_ptr<const Source> its_source, State its_start)
     : source(std::move(its_source)),
@@ -139,50 +134,6 @@ exmat_status exmat_body_read_report(const exmat_body* body, exmat_report* report
   return EXMAT_OK;
 }
 
-exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* points, const double* forces,
-                                     std::int64_t coordinates) noexcept {
-  EXMAT_REQUIRE(body);
-  EXMAT_REQUIRE(points);
-  EXMAT_REQUIRE(forces);
-  if (points->source != body->source)
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: the points are those of another model", __func__);
-  if (const exmat_status status = require_rows(__func__, points->set)) return status;
-  const RowMatrix& rows = points->set.basis_rows;
-  EXMAT_REQUIRE_LENGTH(coordinates, rows.rows());
-  if (const double* const far = find_far(forces, coordinates))
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: forces: %g: expected finite numbers of at most %g", __func__, *far,
-                kFarthest);
-  const BodyFrame& frame = *body->model().frame;
-  const Placement placement = frame.placement(body->state.frame);
-  Eigen::VectorXd& sum = body->force;
-  sum.setZero();
-  Eigen::Vector3d total = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
-  for (Eigen::Index i = 0; i < rows.rows(); i += 3) {
-    const Eigen::Vector3d force = Eigen::Map<const Eigen::Vector3d>(forces + i);
-    total += force;
-    torque += (position(points->set, i / 3, *body, placement) - placement.position).cross(force);
-    sum += rows.middleRows<3>(i).transpose().lazyProduct(placement.rotation.transpose() * force);
-  }
-  if (!sum.allFinite()) return fail(EXMAT_INVALID_ARGUMENT, "%s: forces: expected a finite sum", __func__);
-  body->state.applied_force += sum;
-  if (body->full() != nullptr) add_vertex_forces(points->set, forces, body->full()->space, body->state.vertex_force);
-  frame.apply(total, torque, body->state.frame);
-  if (!body->capacity) return EXMAT_OK;
-  return guarded(__func__, [&] {
-    const Eigen::Map<const VertexArray> world(forces, coordinates / 3, 3);
-    add_load(points->set, world * placement.rotation, *body);
-  });
-}
-
-exmat_status exmat_body_clear_forces(exmat_body* body) noexcept {
-  EXMAT_REQUIRE(body);
-  body->state.applied_force.setZero();
-  body->state.vertex_force.setZero();
-  body->model().frame->clear_forces(body->state.frame);
-  body->load.setZero();
-  return EXMAT_OK;
-}
-
 exmat_status exmat_body_restart_integrator(exmat_body* body) noexcept {
   EXMAT_REQUIRE(body);
   body->state.begins_anew = true;
@@ -241,7 +192,7 @@ exmat_status exmat_body_read_positions_double(const exmat_body* body, const exma
   EXMAT_REQUIRE_LENGTH(coordinates, points->set.basis_rows.rows());
   const Placement placement = body->model().frame->placement(body->state.frame);
   for (Eigen::Index i = 0; i < points->set.rest.rows(); ++i)
-    Eigen::Map<Eigen::Vector3d>(xyz + 3 * i) = position(points->set, i, *body, placement);
+    Eigen::Map<Eigen::Vector3d>(xyz + 3 * i) = world_position(points->set, i, *body, placement);
   return EXMAT_OK;
 }
 

@@ -32,9 +32,6 @@ void add_step(const StepReport& step, exmat_body& body) noexcept;
 /// After the last step of a call: the lost work of a body that has a capacity.
 void measure_lost_work(exmat_body& body) noexcept;
 
-/// Remembers, for a body with a capacity, `forces` [k x 3] that were applied to points, in its own frame.
-void add_load(const PointSet& points, const VertexArray& forces, exmat_body& body);
-
 inline bool non_finite(const exmat_body& body) noexcept { return (body.report.status & kStepNonFinite) != 0; }
 exmat_status fail_non_finite(const char* function, const char* which, const exmat_body& body) noexcept;
 

@@ -43,10 +43,6 @@ void measure_lost_work(exmat_body& body) noexcept {
   }
 }
 
-void add_load(const PointSet& points, const VertexArray& forces, exmat_body& body) {
-  if (body.capacity) body.load += body.capacity->spread_load(points.rest, forces);
-}
-
 }  // namespace exmat::runtime
 
 exmat_status exmat_capacity_create(const exmat_model* model, double spread, exmat_capacity** capacity) noexcept {
@@ -106,6 +102,8 @@ exmat_status exmat_body_set_capacity(exmat_body* body, const exmat_capacity* cap
   return guarded(__func__, [&] {
     Eigen::VectorXd load;
     if (capacity != nullptr) load = Eigen::VectorXd::Zero(3 * body->source->loaded.summary.vertices);
+    std::vector<Eigen::VectorXd> loads(body->forces.size(), load);
+    for (std::size_t i = 0; i < loads.size(); ++i) body->forces[i].load = std::move(loads[i]);
     body->load = std::move(load);
     body->capacity = capacity != nullptr ? capacity->capacity : nullptr;
   });

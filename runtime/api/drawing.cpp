@@ -1,7 +1,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cinttypes>
-#include <cmath>
 #include <fmt/format.h>
 #include <vector>
 
@@ -43,34 +42,6 @@ PointSet points_on_surface(const exmat_surface& surface, const std::int64_t* tri
   return result;
 }
 
-/// What a ray meets first.
-struct Hit {
-  Eigen::Index triangle = -1;
-  Eigen::Vector3d shares = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::Zero();
-  double distance = 0;  ///< [m]
-};
-
-/// Moeller and Trumbore 1997.
-Hit first_hit(const TriangleArray& triangles, const std::vector<double>& xyz, const Eigen::Vector3d& origin,
-              const Eigen::Vector3d& direction, double most) {
-  const auto corner = [&](Eigen::Index triangle, int c) {
-    return Eigen::Map<const Eigen::Vector3d>(xyz.data() + 3 * static_cast<Eigen::Index>(triangles(triangle, c)));
-  };
-  Hit first;
-  first.distance = most;
-  for (Eigen::Index k = 0; k < triangles.rows(); ++k) {
-    const Eigen::Vector3d a = corner(k, 0), ab = corner(k, 1) - a, ac = corner(k, 2) - a, from = origin - a;
-    const Eigen::Vector3d across = direction.cross(ac), over = from.cross(ab);
-    const double volume = ab.dot(across);
-    if (volume == 0) continue;
-    const double second = from.dot(across) / volume, third = direction.dot(over) / volume;
-    const double distance = ac.dot(over) / volume;
-    if (second < 0 || third < 0 || second + third > 1 || distance < 0 || !(distance <= first.distance)) continue;
-    first = {k, {1 - second - third, second, third}, ab.cross(ac).normalized(), distance};
-  }
-  return first;
-}
-
 }  // namespace
 
 exmat_status exmat_surface_create(const exmat_model* model, std::int32_t kind, exmat_surface** surface) noexcept {
@@ -84,7 +55,8 @@ exmat_status exmat_surface_create(const exmat_model* model, std::int32_t kind, e
     if (kind == EXMAT_SURFACE_RENDER && !has_render) throw InvalidArgument("the bundle has no render mesh");
     const std::lock_guard lock(reading());
     ReadSurface read = read_surface(*model->source, has_render && kind != EXMAT_SURFACE_OBJECT);
-    *surface = new exmat_surface{{model->source, std::move(read.points)}, std::move(read.drawn)};
+    const DeformedBox box(read.points);
+    *surface = new exmat_surface{{model->source, std::move(read.points)}, std::move(read.drawn), box};
   });
 }
 
@@ -188,35 +160,6 @@ exmat_status exmat_body_read_placement(const exmat_body* body, double* placement
   rows.leftCols<3>() = now.rotation;
   rows.col(3) = now.to_world(Eigen::Vector3d::Zero());
   return EXMAT_OK;
-}
-
-exmat_status exmat_body_cast_ray(const exmat_body* body, const exmat_surface* surface, const double* origin,
-                                 const double* direction, double most, std::int64_t* triangle, double* shares,
-                                 double* distance, double* normal) noexcept {
-  EXMAT_REQUIRE(body);
-  EXMAT_REQUIRE(surface);
-  EXMAT_REQUIRE(origin);
-  EXMAT_REQUIRE(direction);
-  EXMAT_REQUIRE(triangle);
-  *triangle = -1;
-  if (find_far(origin, 3) != nullptr || find_far(direction, 3) != nullptr || !(most >= 0))
-    return fail(EXMAT_INVALID_ARGUMENT,
-                "%s: expected an origin and a direction of numbers within 1e30, and a distance >= 0", __func__);
-  const Eigen::Vector3d way = Eigen::Map<const Eigen::Vector3d>(direction).stableNormalized();
-  if (!(way.norm() > 0.5)) return fail(EXMAT_INVALID_ARGUMENT, "%s: direction: expected one that is not 0", __func__);
-  exmat_status read = EXMAT_OK;
-  const exmat_status done = guarded(__func__, [&] {
-    std::vector<double> xyz(static_cast<std::size_t>(surface->points.set.basis_rows.rows()));
-    read = exmat_body_read_positions_double(body, &surface->points, xyz.data(), std::ssize(xyz));
-    if (read != EXMAT_OK) return;
-    const Hit hit = first_hit(surface->drawn.triangles, xyz, Eigen::Map<const Eigen::Vector3d>(origin), way, most);
-    if (hit.triangle < 0) return;
-    *triangle = hit.triangle;
-    if (shares != nullptr) Eigen::Map<Eigen::Vector3d>{shares} = hit.shares;
-    if (distance != nullptr) *distance = hit.distance;
-    if (normal != nullptr) Eigen::Map<Eigen::Vector3d>{normal} = hit.normal;
-  });
-  return done == EXMAT_OK ? read : done;
 }
 
 exmat_status exmat_body_read_energy_density(const exmat_body* body, exmat_surface* surface, float* density,

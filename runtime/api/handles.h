@@ -7,7 +7,9 @@
 
 #include "common/mesh/assembly.h"
 #include "exmat/exmat.h"
+#include "runtime/api/applied_forces.h"
 #include "runtime/api/contact_record.h"
+#include "runtime/api/deformed_box.h"
 #include "runtime/api/drawn_surface.h"
 #include "runtime/api/point_set.h"
 #include "runtime/capacity/load_capacity.h"
@@ -47,6 +49,7 @@ struct exmat_shape {
 struct exmat_surface {
   exmat_points points;
   exmat::runtime::ModelSurface drawn;
+  exmat::runtime::DeformedBox box;  ///< of its points
 };
 
 struct exmat_matrix {
@@ -81,6 +84,8 @@ struct exmat_body {
   exmat_world* world = nullptr;                                  ///< that it is in, always one
   std::int64_t id = 0;                                           ///< in that
   std::int64_t next_attachment = 0;                              ///< its id
+  std::vector<exmat::runtime::AppliedForces> forces;             ///< empty, or those without an id, then each with one
+  std::int64_t next_forces = 0;                                  ///< id of the next
   std::unique_ptr<exmat::runtime::Reach> reach;                  ///< present while it reaches for something
   bool reaches_by_scene = false;                                 ///< for that of its scene
   std::unique_ptr<exmat_world> own;                              ///< the world, where it is the body's own

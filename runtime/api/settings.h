@@ -27,6 +27,7 @@ inline constexpr StructSizes kProfileSizes{48, sizeof(exmat_profile)};
 inline constexpr StructSizes kAttachmentSizes{offsetof(exmat_attachment, break_force) + sizeof(double),
                                               sizeof(exmat_attachment)};
 inline constexpr StructSizes kReachSizes{56, sizeof(exmat_reach)};
+inline constexpr StructSizes kRayHitSizes{88, sizeof(exmat_ray_hit)};
 inline constexpr std::size_t kMostStructBytes = 4096;  ///< limit on the size of any version
 
 /// The defaults of a scene file.

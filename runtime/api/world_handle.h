@@ -71,6 +71,10 @@ double time_of(const exmat_world& world) noexcept;
 /// At rest where it starts, at its time 0, without applied forces.
 void put_to_start(exmat_body& body) noexcept;
 
+/// World position [m] of a point that has rows of the basis.
+Eigen::Vector3d world_position(const PointSet& points, Eigen::Index i, const exmat_body& body,
+                               const Placement& placement) noexcept;
+
 /// A body was put elsewhere: its world forgets what it touched.
 void was_put(exmat_body& body) noexcept;
 

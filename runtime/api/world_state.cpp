@@ -195,6 +195,28 @@ void visit_attachments(Archive& archive, Body& body) {
     if (!archive.checks() && (!fits || before != count)) body.world->world.fit_attachments(place_of(body));
 }
 
+/// Forces of the host with an id, and the sum of the others, where there are some.
+template <typename Archive, typename Body>
+void visit_forces(Archive& archive, Body& body) {
+  archive.whole("forces", body.next_forces, kMostSteps);
+  auto& all = body.forces;
+  const std::size_t count = archive.size("forces", all);
+  AppliedForces unused;
+  for (std::size_t i = 0; i < count; ++i) {
+    auto& forces = *(archive.checks() ? &unused : &all[i]);
+    if (i > 0) archive.whole("id", forces.id, kMostSteps);
+    archive.array(forces.modes, body.modes(), 1);
+    archive.array(forces.vertices, body.state.vertex_force.size(), 1);
+    archive.array(forces.force);
+    archive.array(forces.torque);
+    if constexpr (std::is_same_v<Archive, StateReader>) {  // no snapshot holds loads: what is measured stays
+      if (archive.checks()) continue;
+      forces.load = body.load;
+      if (i > 0) forces.load.setZero();
+    }
+  }
+}
+
 /// Targets that the body reaches for, with its points.
 template <typename Archive, typename Body>
 void visit_reach(Archive& archive, Body& body) {
@@ -294,6 +316,7 @@ void visit_snapshot(Archive& archive, World& world) {
     visit_settings(archive, body);
     visit_reach(archive, body);
     visit_attachments(archive, body);
+    visit_forces(archive, body);
     int contacts = world.world.lone_contacts(static_cast<int>(i));
     archive.whole("contacts", contacts, kMostSteps);
     if constexpr (!std::is_const_v<World>)
@@ -315,7 +338,7 @@ void visit_snapshot(Archive& archive, World& world) {
 /// A snapshot begins with this; its numbers follow.
 struct Header {
   char format[8] = {'e', 'x', 'm', 'a', 't', 's', 'n', 'p'};
-  std::uint64_t version = 2;
+  std::uint64_t version = 3;
   std::uint64_t world = 0;    ///< fingerprint of the world
   std::uint64_t numbers = 0;  ///< that follow
   std::uint64_t sum = 0;      ///< of their bits
@@ -397,8 +420,10 @@ void set_world(std::span<const double> numbers, exmat_world& world) {
   const double time = time_of(world);
   StateReader reader(numbers, StateReader::Use::kTake);
   visit_motion(reader, world);
-  for (const auto& member : world.members)
+  for (const auto& member : world.members) {
     member.body->state.begins_anew |= holds_modes(member.body->state.attachments);  // whose past it does not hold
+    member.body->forces.clear();                                                    // of which the state has the sum
+  }
   world.world.take_states();
   world.contacts.clear();
   world.touches.clear();

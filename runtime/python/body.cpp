@@ -31,6 +31,16 @@ void apply_forces(BodyObject& body, const PointsObject& points, const Numbers& f
   body.get().apply_forces(points.points, read_span(forces));
 }
 
+std::int64_t add_forces(BodyObject& body, const PointsObject& points, const Numbers& forces) {
+  require_shape(forces, "forces", {static_cast<py::ssize_t>(points.count), 3});
+  return body.get().add_forces(points.points, read_span(forces));
+}
+
+void set_forces(BodyObject& body, std::int64_t id, const PointsObject& points, const Numbers& forces) {
+  require_shape(forces, "forces", {static_cast<py::ssize_t>(points.count), 3});
+  body.get().set_forces(id, points.points, read_span(forces));
+}
+
 py::tuple compliance(BodyObject& body, const PointsObject& points) {
   const auto size = static_cast<py::ssize_t>(3 * points.count);
   py::array_t<double> velocity({size / 3, py::ssize_t{3}}), matrix({size, size});
@@ -199,6 +209,14 @@ void bind_actions(BodyClass& type) {
            "Adds forces of shape (k, 3) [N], world frame, on the points to those that act in every step from now on.")
       .def(
           "clear_forces", [](BodyObject& body) { body.get().clear_forces(); }, "Ends all applied forces.")
+      .def("add_forces", &add_forces, py::arg("points"), py::arg("forces"),
+           "As apply_forces(), with an id, which it returns: these can be changed and removed while all others stay to "
+           "the last bit. They end with clear_forces(), reset() and a state that is set, which holds the sum of all.")
+      .def("set_forces", &set_forces, py::arg("id"), py::arg("points"), py::arg("forces"),
+           "Puts forces of shape (k, 3) [N], world frame, on the points in place of those that had the id.")
+      .def(
+          "remove_forces", [](BodyObject& body, std::int64_t id) { body.get().remove_forces(id); }, py::arg("id"),
+          "The body then is as if it had never got the forces of this id.")
       .def(
           "restart_integrator", [](BodyObject& body) { body.get().restart_integrator(); },
           "After an abrupt change of forces: keeps the impulse exact, at the price of one step of first order.");

@@ -49,6 +49,18 @@ std::optional<RayHit> cast_ray(BodyObject& body, const SurfaceObject& surface, c
   return hit;
 }
 
+std::optional<RayHit> cast_ray_through(WorldObject& world, const std::vector<std::shared_ptr<SurfaceObject>>& given,
+                                       const Numbers& origin, const Numbers& direction, double within) {
+  require_shape(origin, "origin", {3});
+  require_shape(direction, "direction", {3});
+  std::vector<const Surface*> surfaces;
+  for (const auto& surface : given) {
+    if (!surface) throw Error(EXMAT_INVALID_ARGUMENT, "surfaces: expected surfaces, found None");
+    surfaces.push_back(&surface->surface);
+  }
+  return world.get().cast_ray(surfaces, read_span(origin).first<3>(), read_span(direction).first<3>(), within);
+}
+
 py::array_t<double> placement(BodyObject& body) {
   py::array_t<double> rows({3, 4});
   check(exmat_body_read_placement(body.get().get(), rows.mutable_data()));
@@ -172,7 +184,9 @@ void bind_ray_hit(py::module_& module) {
           "Those of the triangle's corners, shape (3,), sum 1, as Surface.points() takes them.")
       .def_readonly("distance", &RayHit::distance, "[m]")
       .def_property_readonly(
-          "normal", [array](const RayHit& hit) { return array(hit.normal); }, "Outward, of length 1: shape (3,).");
+          "normal", [array](const RayHit& hit) { return array(hit.normal); }, "Outward, of length 1: shape (3,).")
+      .def_readonly("body", &RayHit::body, "Of World.cast_ray(): the id of the body; else -1.")
+      .def_readonly("surface", &RayHit::surface, "Of World.cast_ray(): the place of its surface in the list; else 0.");
 }
 
 void bind_drawing(py::module_& module, BodyClass& body, WorldClass& world, BatchClass& batch) {
@@ -182,6 +196,12 @@ void bind_drawing(py::module_& module, BodyClass& body, WorldClass& world, Batch
   bind_profile(body);
   bind_profile(world);
   bind_profile(batch);
+  world.def(
+      "cast_ray", &cast_ray_through, py::arg("surfaces"), py::arg("origin"), py::arg("direction"),
+      py::arg("within") = std::numeric_limits<double>::infinity(),
+      "The first triangle of all bodies, as Body.cast_ray(); bodies have those surfaces of the list that are of "
+      "their model, others and obstacles are not seen. Bodies in their modes cost little where the ray misses the "
+      "box about all that these reach.");
   body.def("positions", &surface_positions, py::arg("surface"), py::arg("out") = py::none(),
            "Those of the k points of a surface, likewise.")
       .def("energy_density", &energy_density, py::arg("surface"),

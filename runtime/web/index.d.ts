@@ -192,6 +192,12 @@ export class Body implements Owner {
   /** Adds forces [3k] [N] that stay until they are cleared. */
   applyForces(points: Points, forces: Numbers): void;
   clearForces(): void;
+  /** Adds forces [3k] [N] that can be changed and removed while all others stay to the last bit; their id. */
+  addForces(points: Points, forces: Numbers): number;
+  /** Puts forces [3k] [N] in place of those that had the id. */
+  setForces(id: number, points: Points, forces: Numbers): void;
+  /** The body then is as if it had never got the forces of this id. */
+  removeForces(id: number): void;
   restartIntegrator(): void;
   setGravity(gravity: Numbers): void;
   setDamping(mass: number, stiffness: number): void;
@@ -232,6 +238,30 @@ export class Body implements Owner {
   free(): void;
 }
 
+/** Two that touched before the last call that stepped their world, or after it. */
+export interface Touch {
+  body: Body;
+  /** Another body, or the same where it touches itself; null of an obstacle. */
+  other: Body | null;
+  /** Id of an obstacle; null of another body. */
+  obstacle: number | null;
+  /** "begins": after the call, not before it. */
+  change: "begins" | "stays" | "ends";
+}
+
+/** A place of a surface of a body that a ray meets. */
+export interface RayHit {
+  body: Body;
+  surface: Surface;
+  /** Of the surface; its corners' shares [3], sum 1, as Surface.pointsOn() and Hand take them. */
+  triangle: number;
+  shares: number[];
+  /** From the origin of the ray [m] */
+  distance: number;
+  /** Unit, outward [3] */
+  normal: number[];
+}
+
 /** Bodies that may touch each other, and obstacles. */
 export class World implements Owner {
   constructor(law?: ContactLaw);
@@ -239,6 +269,13 @@ export class World implements Owner {
   add<T extends Body>(body: T): T;
   addObstacle(obstacle: Obstacle): number;
   removeObstacle(id: number): void;
+  /** In the last call that stepped the world, a copy. Touches shorter than a call are not told. */
+  readonly touches: Touch[];
+  /**
+   * The first triangle of all bodies, as they are now, that a ray from `origin` [3] [m] along `direction` [3] meets
+   * within so many metres, from either side; null: none. Bodies have those of `surfaces` that are of their models.
+   */
+  castRay(surfaces: readonly Surface[], origin: Numbers, direction: Numbers, options?: { within?: number }): RayHit | null;
   step(count?: number): this;
   reset(): void;
   readonly time: number;

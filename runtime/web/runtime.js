@@ -33,6 +33,7 @@ const CHOICES = {
 const SHAPES = ["plane", "sphere", "box", "capsule", "mesh", "heightField"];
 const SURFACES = ["auto", "object", "render"];
 const ATTACHMENTS = ["fixed", "ball", "spring"];
+const TOUCHES = ["begins", "stays", "ends"];
 
 const snakeCase = (name) => name.replace(/[A-Z]/g, (letter) => "_" + letter.toLowerCase());
 
@@ -131,7 +132,8 @@ class Module {
     for (const [name, { offset, type, count }] of Object.entries(members)) {
       if (name === "size") continue;
       const view = new DataView(this.memory.buffer, address + offset);
-      const numbers = Array.from({ length: count }, (_, i) => (type === "d" ? view.getFloat64(8 * i, true) : view.getInt32(4 * i, true)));
+      const read = { d: (i) => view.getFloat64(8 * i, true), l: (i) => Number(view.getBigInt64(8 * i, true)) }[type] ?? ((i) => view.getInt32(4 * i, true));
+      const numbers = Array.from({ length: count }, (_, i) => read(i));
       result[name.replace(/_([a-z])/g, (_, letter) => letter.toUpperCase())] = count > 1 ? numbers : numbers[0];
     }
     return result;
@@ -269,6 +271,17 @@ export class Body extends Owner {
     this.module.lend(numbers, (address) => this.module.call("body_apply_forces", this.handle, points.handle, address, BigInt(numbers.length)));
   }
   clearForces() { this.module.call("body_clear_forces", this.handle); }
+  /** The id of forces that can be changed and removed while all others stay. */
+  addForces(points, forces) {
+    const numbers = doubles(forces);
+    return this.module.lend(numbers, (address) =>
+      Number(this.module.integer64("body_add_forces", this.handle, points.handle, address, BigInt(numbers.length))));
+  }
+  setForces(id, points, forces) {
+    const numbers = doubles(forces);
+    this.module.lend(numbers, (address) => this.module.call("body_set_forces", this.handle, whole(id, "id"), points.handle, address, BigInt(numbers.length)));
+  }
+  removeForces(id) { this.module.call("body_remove_forces", this.handle, whole(id, "id")); }
   restartIntegrator() { this.module.call("body_restart_integrator", this.handle); }
   setGravity(gravity) { this.module.lend(doubles(gravity), (address) => this.module.call("body_set_gravity", this.handle, address)); }
   setDamping(mass, stiffness) { this.module.call("body_set_damping", this.handle, mass, stiffness); }
@@ -349,13 +362,14 @@ function addObstacle(module, world, obstacle) {
 
 /** Bodies that may touch each other, and obstacles. */
 class WorldOfModule extends Owner {
+  #ids = new Map();
   constructor(module, law) {
     super(module, module.struct("contact_law", law, (address) => module.create("world_create", address)),
           (handle) => module.exports.exmat_world_destroy(handle));
     this.bodies = [];
   }
   add(body) {
-    this.module.integer64("world_add_body", this.handle, body.handle);
+    this.#ids.set(Number(this.module.integer64("world_add_body", this.handle, body.handle)), body);
     body.world = this;
     this.bodies.push(body);
     return body;
@@ -367,6 +381,24 @@ class WorldOfModule extends Owner {
     return this;
   }
   reset() { this.module.call("world_reset", this.handle); }
+  /** Who touched before the last call that stepped the world, or after it, and how that changed. */
+  get touches() {
+    const count = Number(this.module.exports.exmat_world_touches(this.handle)), { bytes } = this.module.structs.touch;
+    return this.module.borrow(count * bytes, (address) => {
+      this.module.call("world_read_touches", this.handle, address, BigInt(count), bytes);
+      return Array.from({ length: count }, (_, i) => {
+        const { body, other, obstacle, change } = this.module.readStruct("touch", address + i * bytes);
+        return { body: this.#ids.get(body), other: this.#ids.get(other) ?? null, obstacle: obstacle < 0 ? null : obstacle, change: TOUCHES[change] };
+      });
+    });
+  }
+  /** The first triangle of all bodies, by those of `surfaces` that are of their models, that a ray meets; null: none. */
+  castRay(surfaces, origin, direction, { within = Infinity } = {}) {
+    const { module } = this, ray = new Float64Array([...ofLength(origin, 3, "origin"), ...ofLength(direction, 3, "direction")]);
+    const { body, surface, triangle, shares, distance, normal } = module.lend(Uint32Array.from(surfaces, ({ handle }) => handle), (list) =>
+      module.lend(ray, (address) => module.read("ray_hit", "world_cast_ray", this.handle, list, BigInt(surfaces.length), address, address + 24, within)));
+    return body < 0 ? null : { body: this.#ids.get(body), surface: surfaces[surface], triangle, shares, distance, normal };
+  }
   get time() { return this.module.exports.exmat_world_time(this.handle); }
   get energies() { return this.module.read("energies", "world_read_energies", this.handle); }
   get state() {

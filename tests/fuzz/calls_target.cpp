@@ -452,6 +452,10 @@ class Calls {
         checked(choices_.one_in(4) ? exmat_body_apply_impulses(one, at, forces.data(), choices_.length(count))
                                    : exmat_body_apply_forces(one, at, forces.data(), choices_.length(count)));
         if (count == 3) checked(exmat_body_reach(one, at, forces.data(), count, nullptr));
+        std::int64_t id = choices_.whole();
+        if (choices_.one_in(2)) checked(exmat_body_add_forces(one, at, forces.data(), choices_.length(count), &id));
+        if (choices_.one_in(2)) checked(exmat_body_set_forces(one, id, at, forces.data(), choices_.length(count)));
+        if (choices_.one_in(2)) checked(exmat_body_remove_forces(one, choices_.one_in(2) ? id : choices_.whole()));
         return;
       }
       case 3:
@@ -667,6 +671,12 @@ class Calls {
         const std::vector<double> ray = choices_.numbers(7);
         checked(exmat_body_cast_ray(one, surface, ray.data(), ray.data() + 3, ray[6], &hit, numbers.data(),
                                     numbers.data() + 3, numbers.data() + 4));
+        const std::array<const exmat_surface*, 2> surfaces{surface, choices_.of(surfaces_)};
+        Padded<exmat_ray_hit> met;
+        met.value.size = sizeof met.value;
+        choices_.size(met.value);
+        checked(exmat_world_cast_ray(all, surfaces.data(), std::min<std::int64_t>(choices_.length(2), 2), ray.data(),
+                                     ray.data() + 3, ray[6], &met.value));
         std::array<std::int32_t, 4096> triangles{};
         checked(exmat_surface_read_triangles(surface, triangles.data(),
                                              fits(std::max<std::int64_t>(3 * exmat_surface_triangles(surface), 0))));

@@ -67,6 +67,22 @@ test("forces, weights and energies", async () => {
   model.free();
 });
 
+test("forces that were removed or changed leave the bits of those that were given so", async () => {
+  const model = await files.load(pack, settings);
+  const body = new model.Body(), given = new model.Body(), never = new model.Body(), tip = model.points([model.vertices - 1]);
+  for (const each of [body, given, never]) each.applyForces(tip, [0.1, 0.2, 0.3]);
+  const id = body.addForces(tip, [3e5, 1e5, 0]);
+  body.setForces(id, tip, [0, 2, 1]);
+  given.applyForces(tip, [0, 2, 1]);
+  assert.equal(body.step(20).hash, given.step(20).hash);
+  body.state = never.state;
+  assert.throws(() => body.removeForces(id), files.InvalidArgument);
+  body.removeForces(body.addForces(tip, [3e5, 1e5, 0]));
+  assert.equal(body.step(20).hash, never.step(20).hash);
+  assert.throws(() => body.setForces(0.5, tip, [0, 0, 1]), files.InvalidArgument);
+  model.free();
+});
+
 test("a batch steps as its bodies do", async () => {
   const model = await files.load(pack, settings);
   const batch = new model.Batch(16), body = new model.Body();
@@ -146,6 +162,87 @@ test("a body that is tied to another falls with it, and neither leaves the other
   body.detach(id);
   assert.throws(() => body.attachTo([0], body, [1], {}), files.InvalidArgument, "itself");
   world.free();
+  model.free();
+});
+
+test("touches begin, stay and end where bodies and the floor do", async () => {
+  const model = await files.load(join(process.env.EXMAT_PACKS, "falling.exmat"), { gravity: [0, 0, -9.81], timeStep: 0.005, massDamping: 1, useContact: true });
+  const world = new files.World({ damping: 1e4 }), lower = world.add(new model.Body()), upper = world.add(new model.Body());
+  const all = model.surface("object"), heights = (xyz) => Array.from(xyz).filter((_, i) => i % 3 === 2);
+  const rest = heights(all.points.rest), low = Math.min(...rest), high = Math.max(...rest), ground = low - 0.02;
+  const floor = world.addObstacle({ point: [0, 0, ground], direction: [0, 0, 1], stiffness: 1e6, damping: 1e4 });
+  upper.motion = { position: [0, 0, high - low + 0.01] };
+  const above = (body, z) => Math.min(...heights(body.readPositions(all.points))) - z;
+  assert.deepEqual(world.touches, []);
+  const told = [];
+  for (let i = 0; i < 400 && told.length < 2; ++i) {
+    world.step();
+    for (const { body, other, obstacle, change } of world.touches) {
+      if (change !== "begins" || told.includes(other)) continue;
+      assert.equal(body, lower);
+      assert.equal(obstacle, other === null ? floor : null);
+      assert.ok(other === null || other === upper);
+      const gap = other === null ? above(lower, ground) : above(upper, Math.max(...heights(lower.readPositions(all.points))));
+      assert.ok(Math.abs(gap) < 0.05, `they meet at a distance of ${gap}`);
+      told.push(other);
+    }
+  }
+  assert.deepEqual(new Set(told), new Set([null, upper]));
+  world.step(200);
+  assert.deepEqual(world.step().touches.map(({ change }) => change), ["stays", "stays"]);
+  for (const body of [lower, upper]) body.setGravity([0, 0, 30]);
+  let ended = false;
+  for (let i = 0; i < 400 && !ended; ++i) {
+    world.step();
+    ended = world.touches.some(({ obstacle, change }) => obstacle === floor && change === "ends");
+  }
+  assert.ok(ended && above(lower, ground) > -0.01);
+  world.free();
+  all.free();
+  model.free();
+});
+
+test("a ray through a world meets the first triangle of all bodies", async () => {
+  const model = await files.load(join(process.env.EXMAT_PACKS, "falling.exmat"), { timeStep: 0.005, useContact: true });
+  const world = new files.World(), bodies = [0, 1, 2].map(() => world.add(new model.Body())), surface = model.surface("object");
+  bodies.forEach((body, i) => { body.motion = { position: [0.3 * i, 0.2 * i, 4 * i], orientation: [Math.cos(i), 0, Math.sin(i), 0] }; });
+  const { triangles, points } = surface, places = bodies.map((body) => body.readPositions(points));
+  const corner = (body, i) => Array.from(places[body].subarray(3 * triangles[i], 3 * triangles[i] + 3));
+  const minus = (a, b) => a.map((x, i) => x - b[i]), dot = (a, b) => a.reduce((sum, x, i) => sum + x * b[i], 0);
+  const cross = (a, b) => [0, 1, 2].map((i) => a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3]);
+  let hits = 0;
+  for (let i = 0; i < 40; ++i) {
+    const target = corner(i % 3, (7 * i) % triangles.length).map((x) => x + 0.01 * Math.sin(5 * i + x));
+    const origin = [6 * Math.sin(i), 6 * Math.cos(i), 4 + 8 * Math.sin(3 * i)], way = minus(target, origin), length = Math.hypot(...way);
+    let nearest = Infinity, meets = -1;
+    for (let body = 0; body < 3; ++body)
+      for (let f = 0; f < triangles.length; f += 3) {
+        // By the plane of the triangle, and the sides of its edges.
+        const [a, b, c] = [0, 1, 2].map((k) => corner(body, f + k)), normal = cross(minus(b, a), minus(c, a));
+        const distance = dot(minus(a, origin), normal) / dot(way, normal) * length;
+        const at = origin.map((x, k) => x + way[k] / length * distance);
+        const inside = [[a, b], [b, c], [c, a]].every(([from, to]) => dot(cross(minus(to, from), minus(at, from)), normal) >= 0);
+        if (inside && distance >= 0 && distance < nearest) [nearest, meets] = [distance, body];
+      }
+    const hit = world.castRay([surface], origin, way);
+    assert.equal(hit === null, meets < 0);
+    if (hit === null) continue;
+    ++hits;
+    assert.equal(hit.body, bodies[meets]);
+    assert.equal(hit.surface, surface);
+    assert.ok(Math.abs(hit.distance - nearest) < 1e-5 * nearest, "positions are of single precision here");
+    const picked = surface.pointsOn([hit.triangle], hit.shares);
+    assert.ok(near(hit.body.readPositions(picked), origin.map((x, k) => x + way[k] / length * hit.distance), 1e-5));
+    assert.ok(Math.abs(Math.hypot(...hit.normal) - 1) < 1e-12);
+    assert.equal(world.castRay([surface], origin, way, { within: 0.99 * nearest }), null);
+    picked.free();
+  }
+  assert.ok(hits > 15);
+  assert.equal(world.castRay([], [0, 0, 9], [0, 0, -1]), null);
+  assert.throws(() => world.castRay([surface], [0, 0, 9], [0, 0, 0]), files.InvalidArgument);
+  assert.throws(() => world.castRay([surface], [0, 9], [0, 0, 1]), files.InvalidArgument);
+  world.free();
+  surface.free();
   model.free();
 });
 

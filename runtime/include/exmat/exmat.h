@@ -9,9 +9,10 @@
  * not said to allow it, and a length that does not fit, are EXMAT_INVALID_ARGUMENT. Lengths count numbers, not points
  * or bytes.
  *
- * Memory: only ..._create... functions allocate (and those of states, of obstacles and of the bodies of worlds, and the
- * first exmat_world_step() with more threads than before, which starts them). What they create is the caller's, to be
- * given to the matching ..._destroy, in any order: a body or a set of points keeps what it needs of its model.
+ * Memory: only ..._create... functions allocate (and those of states, of obstacles and of the bodies of worlds, those
+ * that say so, and the first exmat_world_step() with more threads than before, which starts them). What they create is
+ * the caller's, to be given to the matching ..._destroy, in any order: a body or a set of points keeps what it needs of
+ * its model.
  * ..._destroy(NULL) does nothing.
  *
  * Threads: models and points never change: any number of threads may use them. A body is for one thread at a time.
@@ -225,7 +226,23 @@ EXMAT_API exmat_status exmat_body_read_report(const exmat_body* body, exmat_repo
    they do to the shape turns with the body. Call it again as the body moves. */
 EXMAT_API exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* points, const double* forces,
                                                int64_t coordinates) EXMAT_NOEXCEPT;
+/* Ends all applied forces, those with an id included. */
 EXMAT_API exmat_status exmat_body_clear_forces(exmat_body* body) EXMAT_NOEXCEPT;
+
+/* Adds forces likewise, with an `id` by which they can be changed and removed while all others stay to the last bit: a
+   hand, a wind, a thruster each have their own. No later forces of the body have the same id. Allocates. It ends with
+   exmat_body_clear_forces(), a reset, and a state that the body takes, which holds the sum of all forces; snapshots of
+   worlds keep it. */
+EXMAT_API exmat_status exmat_body_add_forces(exmat_body* body, const exmat_points* points, const double* forces,
+                                             int64_t coordinates, int64_t* id) EXMAT_NOEXCEPT;
+
+/* Puts these forces, on these points, in place of those that had the id. The body then is as if it had got these. An id
+   whose forces do not act is refused. */
+EXMAT_API exmat_status exmat_body_set_forces(exmat_body* body, int64_t id, const exmat_points* points,
+                                             const double* forces, int64_t coordinates) EXMAT_NOEXCEPT;
+
+/* The body then is as if it had never got them: not a bit of the sum of the others is left changed. */
+EXMAT_API exmat_status exmat_body_remove_forces(exmat_body* body, int64_t id) EXMAT_NOEXCEPT;
 
 /* Motion of a free body as a whole, world frame: displacement of the centre of mass from rest [m], unit quaternion (w
    first), velocity of the centre of mass [m/s] and angular velocity [rad/s]. None is set that is above 1e30. */

@@ -104,6 +104,8 @@ struct RayHit {
   std::array<double, 3> shares{};  ///< of its corners, sum 1, as Points::on_surface() takes them
   double distance = 0;             ///< [m]
   std::array<double, 3> normal{};  ///< outward, of length 1
+  std::int64_t body = -1;          ///< of a ray through a world: the id of the body that it meets
+  std::int64_t surface = 0;        ///< likewise: the number of its surface among those that were given
 };
 
 /// A square sparse matrix: row i has the entries from starts[i] to starts[i + 1], their columns ascending.
@@ -341,6 +343,16 @@ class BodyRef {
     check(exmat_body_apply_forces(get(), points.get(), forces.data(), detail::length(forces)));
   }
   void clear_forces() { check(exmat_body_clear_forces(get())); }
+  /// Forces [3k] that can be changed and removed: their id.
+  std::int64_t add_forces(const Points& points, std::span<const double> forces) {
+    std::int64_t id = -1;
+    check(exmat_body_add_forces(get(), points.get(), forces.data(), detail::length(forces), &id));
+    return id;
+  }
+  void set_forces(std::int64_t id, const Points& points, std::span<const double> forces) {
+    check(exmat_body_set_forces(get(), id, points.get(), forces.data(), detail::length(forces)));
+  }
+  void remove_forces(std::int64_t id) { check(exmat_body_remove_forces(get(), id)); }
   void restart_integrator() { check(exmat_body_restart_integrator(get())); }
 
   exmat_motion motion() const {

@@ -172,7 +172,7 @@ EXMAT_API exmat_status exmat_world_set_state(exmat_world* world, const double* n
    the contact law, obstacles that were moved or whose law was changed. A restored world goes on to the last bit. */
 
 /* Bytes of a snapshot taken now; 0 where `world` is NULL. They grow with the bodies and obstacles of the world, and
-   from step to step with contacts (80 a vertex), attachments, and bodies that go to all vertices. */
+   from step to step with contacts (80 a vertex), attachments, forces with an id, and bodies that go to all vertices. */
 EXMAT_API size_t exmat_world_snapshot_size(const exmat_world* world) EXMAT_NOEXCEPT;
 
 /* Saves a snapshot into `buffer` [size >= exmat_world_snapshot_size()], aligned to 8 bytes. Never allocates. A smaller
@@ -183,7 +183,8 @@ EXMAT_API exmat_status exmat_world_save(const exmat_world* world, void* buffer, 
    world has to have the bodies and obstacles, of the same ids and groups, that it had; so has another world, also of
    another process, with the same version of the library and bodies of the same bundles and settings. Anything else is
    refused. Reports and lists of contacts are empty until the next step. Allocates only where the world has to hold what
-   it does not now: attachments made or taken off since, bodies in all vertices, more contacts between bodies. */
+   it does not now: attachments or forces with an id that were added or removed since, bodies in all vertices, more
+   contacts between bodies. */
 EXMAT_API exmat_status exmat_world_restore(exmat_world* world, const void* buffer, size_t size) EXMAT_NOEXCEPT;
 
 /* ---- obstacles ------------------------------------------------------------------------------------------------- */

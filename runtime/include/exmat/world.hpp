@@ -2,7 +2,10 @@
 #ifndef EXMAT_WORLD_HPP
 #define EXMAT_WORLD_HPP
 
+#include <array>
 #include <cstdint>
+#include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -69,6 +72,21 @@ class WorldRef {
     check(exmat_world_read_touches(get(), touches.data(), static_cast<std::int64_t>(touches.size()),
                                    sizeof(exmat_touch)));
     return touches;
+  }
+  /// The first triangle of all bodies that a ray from `origin` [m] along `direction` meets within `most` [m], from
+  /// either side. Bodies have those of `surfaces` that are of their model.
+  std::optional<RayHit> cast_ray(std::span<const Surface* const> surfaces, std::span<const double, 3> origin,
+                                 std::span<const double, 3> direction,
+                                 double most = std::numeric_limits<double>::infinity()) const {
+    std::vector<const exmat_surface*> handles;
+    for (const Surface* surface : surfaces) handles.push_back(surface->get());
+    exmat_ray_hit hit;
+    hit.size = sizeof hit;
+    const auto count = static_cast<std::int64_t>(handles.size());
+    check(exmat_world_cast_ray(get(), handles.data(), count, origin.data(), direction.data(), most, &hit));
+    if (hit.body < 0) return std::nullopt;
+    return RayHit{hit.triangle, std::to_array(hit.shares), hit.distance, std::to_array(hit.normal), hit.body,
+                  hit.surface};
   }
   exmat_energies energies() const {
     exmat_energies energies;

@@ -97,6 +97,19 @@ constexpr Line kLines[] = {
   EXMAT_MEMBER(energies, elastic)
   EXMAT_MEMBER(energies, potential)
   EXMAT_MEMBER(energies, contact)
+  EXMAT_SIZE(touch)
+  EXMAT_MEMBER(touch, body)
+  EXMAT_MEMBER(touch, other)
+  EXMAT_MEMBER(touch, obstacle)
+  EXMAT_MEMBER(touch, change)
+  EXMAT_SIZE(ray_hit)
+  EXMAT_MEMBER(ray_hit, size)
+  EXMAT_MEMBER(ray_hit, body)
+  EXMAT_MEMBER(ray_hit, surface)
+  EXMAT_MEMBER(ray_hit, triangle)
+  EXMAT_MEMBER(ray_hit, shares)
+  EXMAT_MEMBER(ray_hit, distance)
+  EXMAT_MEMBER(ray_hit, normal)
 };
 // clang-format on
 

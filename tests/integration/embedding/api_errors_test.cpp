@@ -241,6 +241,16 @@ TEST_F(ApiTest, WrongArgumentsAreCodes) {
   EXPECT_EQ(exmat_body_apply_forces(b, all.get(), numbers.data(), 6), EXMAT_INVALID_ARGUMENT);
   EXPECT_THAT(exmat_last_error(), HasSubstr("can only be read"));
   EXPECT_EQ(exmat_body_clear_forces(nullptr), EXMAT_INVALID_ARGUMENT);
+  std::int64_t id = 0;
+  EXPECT_EQ(exmat_body_add_forces(nullptr, points.get(), numbers.data(), 6, &id), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_add_forces(b, points.get(), numbers.data(), 6, nullptr), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_add_forces(b, points.get(), bad_numbers.data(), 6, &id), EXMAT_INVALID_ARGUMENT);
+  EXPECT_THAT(exmat_last_error(), HasSubstr("exmat_body_add_forces: forces: "));
+  EXPECT_EQ(exmat_body_set_forces(b, 7, points.get(), numbers.data(), 6), EXMAT_INVALID_ARGUMENT);
+  EXPECT_THAT(exmat_last_error(), HasSubstr("id = 7: expected that of forces that act on the body"));
+  EXPECT_EQ(exmat_body_set_forces(nullptr, 0, points.get(), numbers.data(), 6), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_remove_forces(nullptr, 0), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_remove_forces(b, -1), EXMAT_INVALID_ARGUMENT);
   EXPECT_EQ(exmat_body_restart_integrator(nullptr), EXMAT_INVALID_ARGUMENT);
   EXPECT_EQ(exmat_body_read_positions(nullptr, points.get(), xyz.data(), 6), EXMAT_INVALID_ARGUMENT);
   EXPECT_EQ(exmat_body_read_positions(b, nullptr, xyz.data(), 6), EXMAT_INVALID_ARGUMENT);

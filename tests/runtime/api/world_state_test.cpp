@@ -71,6 +71,11 @@ exmat_motion moving(double x, double z) { return {0, {x, 0, z}, {1, 0, 0, 0}, {0
 void push(exmat::World& world, const exmat::Points& points, int frame) {
   if (frame == 40) world.body(0).apply_forces(points, std::array{0.0, 5.0, 20.0});
   if (frame == 90) world.body(0).clear_forces();
+  static std::int64_t wind = -1;
+  if (frame == 95) wind = world.body(0).add_forces(points, std::array{0.0, 3.0, 1.0});
+  if (frame == 105) world.body(0).apply_forces(points, std::array{0.0, 0.1, 0.0});
+  if (frame == 115) world.body(0).set_forces(wind, points, std::array{1.0, 3.0, 0.0});
+  if (frame == 135) world.body(0).remove_forces(wind);
   if (frame == 130) world.move_obstacle(0, moving(0, 0.01));
   if (frame == 150) world.move_obstacle(0, {0, {}, {1, 0, 0, 0}, {}, {}});
   if (frame == 160) world.set_obstacle_law(0, 2e6, 1e4, 0.1);
@@ -292,7 +297,7 @@ TEST_F(BadSnapshots, AreRefusedInWordsAndTheWorldIsAsItWas) {
     }
   Snapshot of_later = good;
   of_later[1] = 9;
-  refuses(of_later, bytes, "version 9: expected 2");
+  refuses(of_later, bytes, "version 9: expected 3");
 
   exmat::World more = make_world(test, model);
   more.add(exmat::Body(model));

@@ -121,6 +121,25 @@ def test_forces_push(body):
     assert body.time == 0 and np.array_equal(body.q, exmat.Body(body.model).q)
 
 
+def test_forces_with_an_id_are_changed_and_removed_without_a_trace(body):
+    points = exmat.Points(body.model, [339, 300])
+    body.apply_forces(points, [[0.1, 0, 0.7], [0, 0.3, 0]])
+    never, given = copy.copy(body), copy.copy(body)
+    removed = body.add_forces(points, [[3e5, 0, 1e5], [0, 7e4, 0]])
+    changed = body.add_forces(points, np.zeros((2, 3)))
+    body.set_forces(changed, points, [[0, 5, 0], [0, 0, 5]])
+    body.remove_forces(removed)
+    given.apply_forces(points, [[0, 5, 0], [0, 0, 5]])
+    assert body.state == given.state
+    body.remove_forces(changed)
+    assert body.state == never.state
+    with pytest.raises(exmat.InvalidArgument, match=r"^id = 1: expected that of forces that act on the body$"):
+        body.remove_forces(changed)
+    for call in (body.add_forces, lambda *given: body.set_forces(0, *given)):
+        with pytest.raises(exmat.InvalidArgument, match=r"forces: .*\(2, 3\)"):
+            call(points, [[1, 2, 3]])
+
+
 def test_free_motion_is_set_and_read(free_bundle):
     body = exmat.Body(exmat.Model(free_bundle))
     body.motion = exmat.Motion(position=(1, 2, 3), orientation=(2, 0, 0, 0), linear_velocity=(0.5, 0, 0))

@@ -47,6 +47,26 @@ def run_hash(runtime, path, tmp_path):
     return int(runtime("run", path, "--threads", 1, "-o", tmp_path / "run.h5")["state hash"].split()[0], 16)
 
 
+def test_a_ray_meets_the_nearest_body(model, world):
+    surface = exmat.Surface(model)
+    exact = [body.positions(surface, np.empty((len(surface), 3))) for body in world.bodies]
+    middle = exact[0].mean(0)
+    for direction, nearest in (([0, 0, -2], 1), ([0, 0, 3], 0)):
+        origin = middle - 5 * np.array(direction)
+        hit = world.cast_ray([surface], origin, direction)
+        assert (hit.body, hit.surface) == (nearest, 0)
+        own = world[nearest].cast_ray(surface, origin, direction)
+        assert (hit.triangle, hit.distance) == (own.triangle, own.distance) and np.array_equal(hit.normal, own.normal)
+        place = hit.shares @ exact[nearest][surface.triangles[hit.triangle]]
+        np.testing.assert_allclose(place, origin + hit.distance * np.array(direction) / np.linalg.norm(direction), atol=1e-12)
+        assert world.cast_ray([surface], origin, direction, within=0.99 * hit.distance) is None
+    assert world.cast_ray([], origin, direction) is None
+    with pytest.raises(exmat.InvalidArgument, match="direction: expected one that is not 0"):
+        world.cast_ray([surface], origin, [0, 0, 0])
+    with pytest.raises(exmat.InvalidArgument, match="surfaces: expected surfaces, found None"):
+        world.cast_ray([None], origin, direction)
+
+
 def test_a_world_of_a_scene_is_that_of_the_program(scene, scene_file, runtime, tmp_path):
     path = scene_file(**scene)
     worlds = exmat.World.from_scene(path), exmat.World.from_scene(scene)
