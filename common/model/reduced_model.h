@@ -208,13 +208,13 @@ struct RegionData {
 inline constexpr const char* kLoadsOfScene = "the loads of the scene";
 
 /// Group /fidelity: how far the reduced body is from the full space, or one of many modes in its place, in runs that
-/// its basis has not learned from.
-/// Errors are relative, docs/error_metrics.md. Of no use to a step.
+/// its basis has not learned from. Errors are relative, docs/error_metrics.md, and those of the runs under the kind of
+/// load whose shape error is largest. Of no use to a step.
 struct FidelityData {
   std::string loads;               ///< whose loads the runs are of
   std::string reference;           ///< space that ran them: "full_space", "modes"
   std::string basis;               ///< "trained", "modal": which of the two was better and is taken
-  std::string advice;              ///< one sentence
+  std::string advice;              ///< remedy, the kind of load, what was tried and what was not
   std::int64_t training_runs = 0;  ///< that the basis has learned from
   std::int64_t heldout_runs = 0;   ///< that these errors are of
   double position_error = 0;       ///< mean
@@ -222,7 +222,7 @@ struct FidelityData {
   double end_error = 0;            ///< position (a free body: shape) in the last frame of each run
   double settled_error = 0;        ///< likewise, over the last tenth of each run
   double all_elements_error = 0;   ///< shape, with the basis and all elements: no share of cubature
-  double modal_error = 0;          ///< likewise, of the basis of modes and their derivatives alone
+  double modal_error = 0;          ///< likewise, of the basis of modes and their derivatives, under its own worst kind
   double captured_energy = 0;      ///< share of |u|_M^2 of the full motion that the basis can hold
   double target_error = 0;         ///< largest of a table or space of targets
   std::int64_t worst_vertex = 0;   ///< whose distance is largest

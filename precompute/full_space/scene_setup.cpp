@@ -13,9 +13,6 @@ namespace {
 void require_supported(const SceneConfig& config, const std::vector<VertexForceConfig>& forces,
                        const FullSpaceModel& model) {
   const std::string file = config.file.string();
-  if (const std::string keys = place_of_keys(config); !keys.empty())
-    throw InputError({file, keys, "a value: the full-space reference takes no keys", "keys",
-                      "measure scenes with the values between the keys, one by one"});
   const auto require_no_drivers = [&](const std::string& member, const ExampleForceConfig& force) {
     if (!force.drivers.empty())
       throw InputError({file, member + "/drivers",

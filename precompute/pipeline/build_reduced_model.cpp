@@ -382,7 +382,7 @@ void Pipeline::add_fidelity(const BodyStages& stages, const Motions& motions, co
       whole.rigid = rigid_moments(object_.mesh, object_.materials.density, model.modal->basis);
     const RollOut run = final_roll_out(stages, whole, motions);
     return fidelity_of({whole, run, choice.exact, choice.modal, motions.set.runs, motions.set.heldout, choice.trained,
-                        motions.reason, motions.loads,
+                        motions.reason, motions.chains,
                         motions.elements ? TrainingSpace::kModes : TrainingSpace::kFullSpace});
   });
   auto& entry = *std::ranges::find(report_.ledger, "fidelity", &LedgerEntry::group);

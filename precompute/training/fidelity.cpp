@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <limits>
 
 #include "common/mesh/assembly.h"
 #include "common/mesh/geometry.h"
@@ -73,7 +75,86 @@ std::string advice(const FidelityInput& input, const FidelityData& fidelity, con
          "loads";
 }
 
+// The kind of load that errors are of, where runs have several.
+std::string worst_text(const std::vector<Chain>& runs, const std::string& kind) {
+  if (!kind.empty()) return fmt::format("; worst under {} alone", kind);
+  const bool apart = std::ranges::any_of(runs, [](const Chain& chain) { return !chain.front().kind.empty(); });
+  return apart ? "; worst under all loads together" : "";
+}
+
+struct Range {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+
+  void add(double value) {
+    low = std::min(low, value);
+    high = std::max(high, value);
+  }
+  bool empty() const { return low > high; }
+};
+
+std::string text_of(const Range& range) {
+  const std::string low = fmt::format("{:.2g}", range.low), high = fmt::format("{:.2g}", range.high);
+  return low == high ? low : fmt::format("{} to {}", low, high);
+}
+
+// Sizes of what runs tried; empty of kinds that they lack.
+struct Sizes {
+  Range gravity, stiffness, elasticity, bias, force, speed, duration;
+
+  Sizes(const std::vector<Chain>& runs, bool free) {
+    for (const Chain& chain : runs) {
+      double seconds = 0;
+      for (const Segment& segment : chain) {
+        add(segment, free);
+        seconds += segment.duration;
+      }
+      duration.add(seconds);
+    }
+  }
+
+ private:
+  void add(const Segment& segment, bool free) {
+    if (const double g = segment.gravity.norm(); g > 0 && !free) gravity.add(g);
+    for (const runtime::ExampleSettings& examples : segment.examples) {
+      if (!runtime::acts(examples)) continue;
+      (examples.elastic ? elasticity : stiffness).add(examples.stiffness);
+      bias.add(examples.bias);
+    }
+    for (const VertexForceConfig& push : segment.forces)
+      force.add(push.force.norm() * static_cast<double>(push.vertices.size()));
+    if (segment.obstacle) speed.add(segment.motion.linear_velocity.norm());
+  }
+};
+
 }  // namespace
+
+std::string tried_text(const std::vector<Chain>& runs, const TrainingRunOptions& options, bool free) {
+  const Sizes sizes(runs, free);
+  std::vector<std::string> tried;
+  const auto add = [&](const Range& range, const char* text) {
+    if (!range.empty()) tried.push_back(fmt::format(fmt::runtime(text), text_of(range)));
+  };
+  add(sizes.gravity, "gravity of {} m/s^2");
+  add(sizes.stiffness, "example forces of kappa {} 1/s^2");
+  add(sizes.elasticity, "elastic example forces of factor {}");
+  add(sizes.bias, "bias {}");
+  add(sizes.force, "forces of {} N on vertices");
+  add(sizes.speed, "throws at a plane with {} m/s");
+  if (tried.empty()) tried.emplace_back("no load");
+  return fmt::format("{}, in runs of {} s with mass damping {:.2g} 1/s and stiffness damping {:.2g} s",
+                     fmt::join(tried, ", "), text_of(sizes.duration), options.mass_damping.value_or(0),
+                     stiffness_damping_of(options));
+}
+
+std::string untried_text(const std::vector<Chain>& runs, bool free) {
+  const Sizes sizes(runs, free);
+  std::vector<std::string> untried;
+  if (sizes.gravity.empty() && !free) untried.emplace_back("gravity");
+  untried.emplace_back(sizes.bias.empty() ? "example forces" : "stiffer examples");
+  if (sizes.force.empty()) untried.emplace_back("forces on vertices");
+  if (sizes.speed.empty()) untried.emplace_back("contact");
+  return fmt::format("{}, hands, stronger or weaker loads, longer runs, other damping", fmt::join(untried, ", "));
+}
 
 FidelityData fidelity_of(const FidelityInput& input) {
   const ReducedModel& model = input.model;
@@ -95,8 +176,10 @@ FidelityData fidelity_of(const FidelityInput& input) {
   fidelity.worst_vertex = input.final_run.worst_vertex;
   fidelity.worst_distance = finite(input.final_run.worst_distance / bounding_box_diagonal(model.object->mesh.vertices));
   const bool free = !model.object->fixed.any();
-  fidelity.advice = fmt::format("{}; tried: {}; not tried: {}", advice(input, fidelity, mass),
-                                tried_text(input.tried, free), untried_text(input.tried, free));
+  const std::vector<Chain>& runs = input.chains.heldout;
+  fidelity.advice = fmt::format("{}{}; tried: {}; not tried: {}", advice(input, fidelity, mass),
+                                worst_text(runs, input.final_run.kind), tried_text(runs, input.chains.options, free),
+                                untried_text(runs, free));
   return fidelity;
 }
 

@@ -1,10 +1,11 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "common/model/reduced_model.h"
 #include "precompute/training/roll_out.h"
-#include "precompute/training/training_loads.h"
+#include "precompute/training/training_stage.h"
 
 namespace exmat::precompute {
 
@@ -18,11 +19,17 @@ struct FidelityInput {
   const TrainingRuns& heldout;
   bool trained = false;                             ///< which basis it has
   std::string loads;                                ///< whose loads these are
-  const TrainingLoads& tried;                       ///< loads of the runs
+  const TrainingChains& chains;                     ///< the runs
   TrainingSpace space = TrainingSpace::kFullSpace;  ///< space of the runs
 };
 
-/// /fidelity, with one sentence of advice: what of basis, cubature, eigenfunctions and training has most of the error.
+/// /fidelity, with advice: which of basis, cubature, eigenfunctions and training has most of the error, under which
+/// kind of load it is largest, what the runs tried and what they did not.
 FidelityData fidelity_of(const FidelityInput& input);
+
+/// In words: kinds and sizes of the loads of these runs, which are of a body that is `free` or not, how long they last
+/// and their damping; and what they lack.
+std::string tried_text(const std::vector<Chain>& runs, const TrainingRunOptions& options, bool free);
+std::string untried_text(const std::vector<Chain>& runs, bool free);
 
 }  // namespace exmat::precompute

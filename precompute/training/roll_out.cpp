@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 
 #include "precompute/training/reduced_runs.h"
 
 namespace exmat::precompute {
 namespace {
+
+constexpr double kUnmoved = 1e-3;  // of the largest size of a kind: one below it does not move the body
 
 // Sums of squares of distances, and of sizes.
 struct Sums {
@@ -19,6 +22,13 @@ struct Sums {
     size += squared_size;
     ++frames;
   }
+};
+
+// Of the runs of one kind.
+struct KindSums {
+  Sums positions, shapes, ends, settled;
+
+  double size() const { return shapes.frames > 0 ? shapes.size / static_cast<double>(shapes.frames) : 0; }
 };
 
 double square(const SparseMatrix& mass, const Eigen::VectorXd& u) { return u.dot(mass * u); }
@@ -40,7 +50,7 @@ void note_worst(const Eigen::VectorXd& difference, RollOut& result) {
 
 RollOut not_finite() {
   constexpr double kInfinite = std::numeric_limits<double>::infinity();
-  return {kInfinite, kInfinite, kInfinite, kInfinite, 0, kInfinite};
+  return {{}, kInfinite, kInfinite, kInfinite, kInfinite, 0, kInfinite};
 }
 
 }  // namespace
@@ -50,28 +60,36 @@ RollOut roll_out(const ReducedModel& model, EnergyReference reference, const std
   const std::vector<ChainFrames> runs = run_reduced_chains(model, reference, chains, options);
 
   RollOut result;
-  Sums positions, shapes, ends, settled;
+  std::map<std::string, KindSums> kinds;
   Eigen::Index begin = 0;
   for (std::size_t i = 0; i < chains.size(); ++i) {
     const Eigen::Index end = full.chain_ends[i], count = end - begin;
     if (!runs[i].finite || std::ssize(runs[i].deformations) < count) return not_finite();
+    KindSums& sums = kinds[chains[i].front().kind];
     for (Eigen::Index k = 0; k < count; ++k) {
       const auto frame = static_cast<std::size_t>(k);
       const auto u = full.deformations.col(begin + k), x = full.displacements.col(begin + k);
       const Eigen::VectorXd difference = runs[i].deformations[frame] - u;
       const double distance = square(mass, difference), size = square(mass, u);
-      positions.add(square(mass, runs[i].displacements[frame] - x), square(mass, x));
-      shapes.add(distance, size);
-      if (k == count - 1) ends.add(distance, size);
-      if (k >= count - std::max<Eigen::Index>(1, count / 10)) settled.add(distance, size);
+      sums.positions.add(square(mass, runs[i].displacements[frame] - x), square(mass, x));
+      sums.shapes.add(distance, size);
+      if (k == count - 1) sums.ends.add(distance, size);
+      if (k >= count - std::max<Eigen::Index>(1, count / 10)) sums.settled.add(distance, size);
       note_worst(difference, result);
     }
     begin = end;
   }
-  result.position = relative(positions, positions);
-  result.shape = relative(shapes, shapes);
-  result.end = relative(ends, shapes);
-  result.settled = relative(settled, shapes);
+  double largest = 0;
+  for (const auto& [kind, sums] : kinds) largest = std::max(largest, sums.size());
+  for (const auto& [kind, sums] : kinds) {
+    const double shape = relative(sums.shapes, sums.shapes);
+    if (sums.size() < kUnmoved * kUnmoved * largest || shape < result.shape) continue;
+    result.kind = kind;
+    result.position = relative(sums.positions, sums.positions);
+    result.shape = shape;
+    result.end = relative(sums.ends, sums.shapes);
+    result.settled = relative(sums.settled, sums.shapes);
+  }
   return result;
 }
 

@@ -121,32 +121,27 @@ TrainingPlan plan_training(const TrainingConfig& config, const SceneConfig* scen
   return {unknown_loads(body), true, "examples, gravity and pushes of all kinds, since no loads are known"};
 }
 
-std::string tried_text(const TrainingLoads& loads, bool free) {
-  std::vector<std::string> tried;
-  if (const double gravity = loads.gravity.norm(); gravity > 0 && !free)
-    tried.push_back(fmt::format("gravity of {:.3g} m/s^2{}", gravity, loads.any_gravity ? " in any direction" : ""));
-  for (const runtime::ExampleSettings& force : loads.examples) {
-    if (!runtime::acts(force)) continue;
-    const double most = std::exp(stiffness_spread(loads));
-    tried.push_back(fmt::format("example forces of kappa {:.2g} to {:.2g} 1/s^2 and bias {:.2g} to {:.2g}",
-                                force.stiffness / most, force.stiffness * most, std::max(0.0, force.bias - kBiasSpread),
-                                std::min(1.0, force.bias + kBiasSpread)));
-  }
-  if (!loads.forces.empty()) tried.push_back(fmt::format("{} forces on vertices", loads.forces.size()));
-  if (loads.patches) tried.emplace_back("pushes on patches of the surface");
-  if (loads.obstacle && free) tried.push_back(fmt::format("throws at a plane with {:.3g} m/s", loads.velocity.norm()));
-  if (tried.empty()) tried.emplace_back("how it moves by itself");
-  return fmt::format("{}", fmt::join(tried, ", "));
-}
-
-std::string untried_text(const TrainingLoads& loads, bool free) {
-  std::vector<std::string> untried;
-  if (loads.gravity.isZero(0) && !free) untried.emplace_back("gravity");
-  if (std::ranges::none_of(loads.examples, runtime::acts)) untried.emplace_back("example forces");
-  if (loads.forces.empty() && !loads.patches) untried.emplace_back("forces on vertices");
-  if (!loads.obstacle) untried.emplace_back("contact");
-  untried.emplace_back("stronger or weaker ones");
-  return fmt::format("{}", fmt::join(untried, ", "));
+std::vector<LoadKind> kinds_of(const TrainingLoads& loads, bool free) {
+  TrainingLoads none = loads;
+  none.gravity.setZero();
+  none.forces.clear();
+  none.patches = false;
+  for (runtime::ExampleSettings& examples : none.examples) examples.stiffness = examples.damping = 0;
+  none.obstacle.reset();
+  std::vector<LoadKind> kinds;
+  const auto add = [&](bool acts, const char* name, const auto& put) {
+    if (acts) put(kinds.emplace_back(LoadKind{name, none}).loads);
+  };
+  add(!free && loads.gravity.norm() > 0, kGravity, [&](TrainingLoads& one) { one.gravity = loads.gravity; });
+  add(std::ranges::any_of(loads.examples, runtime::acts), "example forces",
+      [&](TrainingLoads& one) { one.examples = loads.examples; });
+  add(!loads.forces.empty() || loads.patches, "forces on vertices", [&](TrainingLoads& one) {
+    one.forces = loads.forces;
+    one.patches = loads.patches;
+  });
+  add(free && loads.obstacle && loads.velocity.norm() > 0, "throws",
+      [&](TrainingLoads& one) { one.obstacle = loads.obstacle; });
+  return kinds;
 }
 
 std::string text_of(const TrainingLoads& loads) {

@@ -74,9 +74,16 @@ TrainingPlan plan_training(const TrainingConfig& config, const SceneConfig* scen
 constexpr double stiffness_spread(const TrainingLoads& loads) { return loads.any_stiffness ? 2.0 : 0.7; }
 inline constexpr double kBiasSpread = 0.3;
 
-/// In words: what runs under these loads have tried, and which kinds of loads they have not.
-std::string tried_text(const TrainingLoads& loads, bool free);
-std::string untried_text(const TrainingLoads& loads, bool free);
+/// LoadKind::name of gravity.
+inline constexpr const char* kGravity = "gravity";
+
+/// One kind of the loads on a body, without the others.
+struct LoadKind {
+  std::string name;
+  TrainingLoads loads;
+};
+/// Those that act on a body: gravity unless it is free, example forces, pushes, throws of a free one.
+std::vector<LoadKind> kinds_of(const TrainingLoads& loads, bool free);
 
 /// All of it, for hashes.
 std::string text_of(const TrainingLoads& loads);

@@ -94,6 +94,7 @@ void SegmentDrawer::throw_at_obstacle(Throw how, Segment& segment) {
 
 Segment SegmentDrawer::segment() {
   Segment segment;
+  segment.kind = options_.kind;
   segment.duration = options_.duration * uniform(0.7, 1.3);
   segment.gravity = vary(loads_.gravity, 0.5, 1.5, 0.2, loads_.any_gravity);
   for (const VertexForceConfig& force : loads_.forces) {
@@ -109,8 +110,9 @@ Segment SegmentDrawer::segment() {
     varied.bias = std::clamp(examples.bias + uniform(-kBiasSpread, kBiasSpread), 0.0, 1.0);
     segment.examples.push_back(varied);
   }
+  const int fewest = options_.kind.empty() ? 0 : 1;  // of a kind by itself, which would not act
   if (loads_.patches)
-    for (int count = std::uniform_int_distribution<int>(0, 2)(generator_); count > 0; --count) add_patch(segment);
+    for (int count = std::uniform_int_distribution<int>(fewest, 2)(generator_); count > 0; --count) add_patch(segment);
   return segment;
 }
 

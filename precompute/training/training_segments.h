@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "common/mesh/tet_mesh.h"
@@ -14,6 +15,7 @@ namespace exmat::precompute {
 
 /// A run under constant loads.
 struct Segment {
+  std::string kind{};   ///< of its loads, LoadKind::name; empty: all of them
   double duration = 0;  ///< [s]
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();
   std::vector<VertexForceConfig> forces;
@@ -30,6 +32,7 @@ struct SegmentOptions {
   double duration = 0;  ///< length of one segment, about [s]
   std::uint64_t seed = 1;
   bool own_loads = true;  ///< begin with a chain of the very loads
+  std::string kind{};     ///< Segment::kind of all
 };
 
 /// A body as far as forces on patches are drawn for it.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numbers>
 
 #include "common/mesh/geometry.h"
@@ -14,6 +15,7 @@ constexpr double kPeriods = 0.8;            // of the lowest mode, that a segmen
 constexpr double kPatchDisplacement = 0.1;  // of L, that a patch's force moves it by, about
 constexpr double kMostSag = 0.2;            // of L, that gravity of unknown direction bends the body by, about
 constexpr int kHeldoutSegments = 2;
+constexpr double kGravityDurations = 3;  // of a held-out run, that one of gravity lasts, whose steps have no targets
 constexpr std::uint64_t kHeldoutSeed = 7'000'003;
 
 FullSpaceModel full_space_of(const TrainingInput& input, const std::vector<TargetSpace>& spaces) {
@@ -65,11 +67,21 @@ TrainingChains draw_training(const TrainingInput& input, TrainingLoads loads, co
   const SegmentBody drawn{object.mesh.vertices, mass.centre.transpose(), free_surface(object), body.size,
                           kPatchDisplacement * body.size / soft};
   const double duration = config.seconds.value_or(kPeriods * 2 * std::numbers::pi / body.angular_frequency);
-  return {draw_segments(loads, drawn, {config.segments, duration, seed}),
-          draw_segments(loads, drawn, {kHeldoutSegments, duration, seed + kHeldoutSeed, false}),
-          {.angular_frequency = body.angular_frequency,
-           .mass_damping = loads.mass_damping,
-           .stiffness_damping = loads.stiffness_damping}};
+  const std::vector<LoadKind> kinds = loads.duration > 0 ? std::vector<LoadKind>() : kinds_of(loads, body.free);
+  const bool apart = kinds.size() > 1;
+  TrainingChains chains{
+      draw_segments(loads, drawn, {config.segments, duration, seed}),
+      draw_segments(loads, drawn, {apart ? 1 : kHeldoutSegments, duration, seed + kHeldoutSeed, false}),
+      {.angular_frequency = body.angular_frequency,
+       .mass_damping = loads.mass_damping,
+       .stiffness_damping = loads.stiffness_damping}};
+  for (std::size_t i = 0; apart && i < kinds.size(); ++i) {
+    const double longer = kinds[i].name == kGravity ? kGravityDurations : 1;
+    std::ranges::move(
+        draw_segments(kinds[i].loads, drawn, {1, longer * duration, seed + kHeldoutSeed + 1 + i, false, kinds[i].name}),
+        std::back_inserter(chains.heldout));
+  }
+  return chains;
 }
 
 TrainingSet run_training(const TrainingInput& input, const std::vector<TargetSpace>& targets,

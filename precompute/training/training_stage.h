@@ -38,7 +38,8 @@ struct TrainingInput {
 
 TrainingBody training_body(const TrainingInput& input);
 
-/// Draws the training's segments and two held-out ones.
+/// Draws the training's segments and two held-out ones. Of loads that are not a scene's the held-out ones are one of
+/// all loads and one of each kind, if there are several; gravity by itself for 2.4 periods of the lowest mode.
 TrainingChains draw_training(const TrainingInput& input, TrainingLoads loads, const TrainingConfig& config,
                              std::uint64_t seed);
 

@@ -3,8 +3,6 @@
 #include <fmt/format.h>
 #include <utility>
 
-#include "common/config/scene_needs.h"
-
 namespace exmat::runtime {
 
 KeyedSetting make_setting(const KeysConfig& config) {
@@ -30,15 +28,11 @@ void describe(const std::string& owner, const char* name, const KeyedSetting& se
 
 }  // namespace
 
-SceneKeys make_keys(const SceneConfig& config, const Model& model) {
+SceneKeys make_keys(const SceneConfig& config) {
   SceneKeys keys;
   keys.gravity = make_setting(config.gravity_keys);
-  const auto add = [&](const ExampleForceConfig& force, const std::string& member) {
-    require_weights(config, force, member, model.examples[keys.examples.size()].weights.examples());
-    keys.examples.push_back(make_example_keys(force.keys));
-  };
-  if (config.examples) add(*config.examples, "examples");
-  for (std::size_t i = 0; i < config.regions.size(); ++i) add(config.regions[i].force, fmt::format("regions/{}", i));
+  if (config.examples) keys.examples.push_back(make_example_keys(config.examples->keys));
+  for (const RegionForceConfig& region : config.regions) keys.examples.push_back(make_example_keys(region.force.keys));
   return keys;
 }
 

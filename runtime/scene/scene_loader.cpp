@@ -265,6 +265,13 @@ std::vector<std::vector<NamedPose>> named_poses(const LoadedScene& loaded) {
   return all;
 }
 
+void check_weights(const SceneConfig& config, const Model& model) {
+  auto examples = model.examples.begin();
+  if (config.examples) require_weights(config, *config.examples, "examples", (examples++)->weights.examples());
+  for (std::size_t i = 0; i < config.regions.size(); ++i)
+    require_weights(config, config.regions[i].force, fmt::format("regions/{}", i), (examples++)->weights.examples());
+}
+
 // Targets that make up for one stiffness and gravity are wrong with others.
 void check_compensation(const SceneConfig& config, const ReducedModel& data) {
   if (!config.examples || !data.targets) return;
@@ -409,7 +416,8 @@ LoadedScene load_run(const SceneConfig& config, const Obstacles* obstacles) {
   check_compensation(config, loaded.data);
   loaded.model = prepare(config, loaded.data);
   if (steps_in_full) loaded.full = prepare_full_space(config, loaded);
-  loaded.keys = make_keys(config, *loaded.model);
+  check_weights(config, *loaded.model);
+  loaded.keys = make_keys(config);
   check_animation(config, loaded);
   const Obstacles all = obstacles != nullptr ? *obstacles : make_obstacles(config.obstacles);
   loaded.scene = step_scene(config, all, loaded);

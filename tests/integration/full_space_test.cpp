@@ -37,6 +37,19 @@ class FullSpaceProgram : public testing::Test {
     return found;
   }
 
+  /// Mean distance of the frames of a run of the scene from those of full.h5, over the largest displacement there.
+  double error_of_run(Json scene, const char* space, Eigen::Index frames) const {
+    scene["space"] = space;
+    scene["output"]["trajectory"] = "run.h5";
+    write_scene(folder_, scene);
+    const Outcome outcome = exmat_runtime({"run", folder_.path("scene.json")});
+    EXPECT_EQ(outcome.status, 0) << outcome.errors;
+    const std::vector<float> found = positions("run.h5"), expected = positions("full.h5");
+    const auto size = static_cast<Eigen::Index>(found.size()) / frames;
+    const Eigen::Map<const Eigen::MatrixXf> a(found.data(), size, frames), b(expected.data(), size, frames);
+    return (a - b).colwise().norm().mean() / (b.colwise() - b.col(0)).colwise().norm().maxCoeff();
+  }
+
   TemporaryFolder folder_;
 };
 
@@ -79,22 +92,32 @@ TEST_F(FullSpaceProgram, IsWhatARunInAllVerticesFinds) {
   scene["forces"] = {{{"vertices", {{"ids", {30, 31}}}}, {"force", {0, 2, 1}}, {"start", 0.04}, {"end", 0.3}}};
   make(scene);
   ASSERT_EQ(full_space().status, 0);
-  const std::vector<float> expected = positions("full.h5");
-  const auto error = [&](const char* space) {
-    Json run = scene;
-    run["space"] = space;
-    run["output"]["trajectory"] = "run.h5";
-    write_scene(folder_, run);
-    const Outcome outcome = exmat_runtime({"run", folder_.path("scene.json")});
-    EXPECT_EQ(outcome.status, 0) << outcome.errors;
-    const std::vector<float> found = positions("run.h5");
-    const auto frames = static_cast<Eigen::Index>(101), size = static_cast<Eigen::Index>(found.size()) / frames;
-    const Eigen::Map<const Eigen::MatrixXf> a(found.data(), size, frames), b(expected.data(), size, frames);
-    return (a - b).colwise().norm().mean() / (b.colwise() - b.col(0)).colwise().norm().maxCoeff();
-  };
-  EXPECT_LE(error("full"), 0.005);
-  EXPECT_LE(error("auto"), 0.03);
-  EXPECT_GE(error("reduced"), 0.05);
+  EXPECT_LE(error_of_run(scene, "full", 101), 0.005);
+  EXPECT_LE(error_of_run(scene, "auto", 101), 0.03);
+  EXPECT_GE(error_of_run(scene, "reduced", 101), 0.05);
+}
+
+// The same of settings that change, some on a line and some at once; with the values of their first keys throughout the
+// run is elsewhere.
+TEST_F(FullSpaceProgram, ChangesKeyedSettingsAsARunInAllVertices) {
+  Json scene = kScene;
+  scene["time_step"] = 0.004;
+  scene["steps"] = 100;
+  scene["output"] = {{"every", 1}};
+  scene["gravity"] = R"({ "keys": [ { "time": 0, "value": [0, -2, 1] }, { "time": 0.2, "value": [0, 1, 1] } ] })"_json;
+  scene["examples"] = R"({ "damping": 5,
+      "stiffness": { "keys": [ { "time": 0, "value": 300 }, { "time": 0.25, "value": 150 } ], "interpolation": "step" },
+      "weights": { "keys": [ { "time": 0.05, "value": [1, 0] }, { "time": 0.2, "value": [0.2, 0.8] } ] } })"_json;
+  make(scene);
+  const Outcome outcome = full_space();
+  ASSERT_EQ(outcome.status, 0) << outcome.errors;
+  EXPECT_LE(error_of_run(scene, "full", 101), 0.002);
+  for (const Json& constant : {R"({ "gravity": [0, -2, 1] })"_json, R"({ "examples": { "stiffness": 300 } })"_json,
+                               R"({ "examples": { "weights": [1, 0] } })"_json}) {
+    Json other = scene;
+    other.merge_patch(constant);
+    EXPECT_GE(error_of_run(other, "full", 101), 0.01) << constant;
+  }
 }
 
 TEST_F(FullSpaceProgram, RefusesWhatABodyInAllVerticesCannotHave) {
@@ -163,6 +186,10 @@ TEST_F(FullSpaceProgram, RefusesWhatItCannotRun) {
           "scene.json: /forces/0/vertices");
   refused({{"obstacles", {{{"plane", {{"point", {0, 0, -1}}, {"normal", {0, 0, 1}}}}}}}}, {}, "/contact");
   refused({{"body", {{"motion", {{{"time", 0}}, {{"time", 1}, {"position", {1, 0, 0}}}}}}}}, {}, "/body/motion");
+  refused(R"({ "examples": { "stiffness": 1, "weights": { "keys": [ { "time": 0, "value": [1, 0, 0] } ] } } })"_json,
+          {}, "/examples/weights: expected 2 numbers, one for each example");
+  refused(R"({ "examples": { "stiffness": 1, "compensate": true } })"_json, {},
+          "/examples/compensate: expected false: targets of the full-space reference are not compensated");
   refused(Json::object(), {"--steps", "0"}, "--steps");
   refused(Json::object(), {"--every", "x"}, "--every");
   const std::string bundle = read_file(folder_.path("bundle.h5"));

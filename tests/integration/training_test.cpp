@@ -74,7 +74,13 @@ TEST_F(Training, OfDeclaredLoadsNeedsNoScene) {
       "loads": { "forces": [ { "vertices": { "ids": [0, 20] }, "force": 3 } ], "gravity": [0, 0, -2] } })");
   ASSERT_EQ(made.status, 0) << made.errors;
   EXPECT_THAT(made.errors, HasSubstr("training: the loads of the asset"));
-  EXPECT_EQ(read_bundle(bundle_).fidelity->loads, "the loads of the asset");
+  const FidelityData found = *read_bundle(bundle_).fidelity;
+  EXPECT_EQ(found.loads, "the loads of the asset");
+  EXPECT_EQ(found.heldout_runs, 4) << "all of them, and gravity, examples and forces alone";
+  for (const char* text : {"; worst under ", "; tried: gravity of ", ", example forces of kappa ",
+                           " N on vertices, in runs of ", " s with mass damping 0 1/s and stiffness damping ",
+                           "; not tried: stiffer examples, contact, hands, stronger or weaker loads, longer runs"})
+    EXPECT_THAT(found.advice, HasSubstr(text));
 }
 
 TEST_F(Training, IsLeftOutWhereTheAssetSaysSo) {

@@ -16,14 +16,16 @@
 namespace exmat::precompute {
 namespace {
 
-// Those that act, in the order of the scene: the whole body's, then the regions'.
-std::vector<runtime::WeightInfo> acting(const SceneConfig& config, const FullSpaceRun& body) {
-  std::vector<std::string> names;
-  if (config.examples) names.emplace_back();
-  for (const RegionForceConfig& region : config.regions) names.push_back(region.name);
+// Those that act at any time, in the order of the scene: the whole body's, then the regions'.
+std::vector<runtime::WeightInfo> acting(const SceneConfig& config, const FullSpaceModel& model) {
   std::vector<runtime::WeightInfo> forces;
-  for (std::size_t i = 0; i < names.size(); ++i)
-    if (runtime::acts(body.scene.examples[i])) forces.push_back({i, names[i], body.model.examples[i].count()});
+  std::size_t i = 0;
+  const auto add = [&](const std::string& name, const ExampleForceConfig& force) {
+    if (force.stiffness > 0 || force.damping > 0) forces.push_back({i, name, model.examples[i].count()});
+    ++i;
+  };
+  if (config.examples) add("", *config.examples);
+  for (const RegionForceConfig& region : config.regions) add(region.name, region.force);
   return forces;
 }
 
@@ -56,7 +58,7 @@ FullSpaceTrajectory::FullSpaceTrajectory(const std::filesystem::path& file, cons
     : data_(data),
       body_(body),
       output_(file),
-      weights_(acting(config, body)),
+      weights_(acting(config, body.model)),
       file_(create_file(output_, config, data, sizes_of(data, frames), weights_, frames)),
       mass_(scalar_mass(data.object->mesh, data.object->materials.density)) {
   const SymbolSizes sizes = sizes_of(data, frames);

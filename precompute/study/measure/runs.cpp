@@ -10,6 +10,7 @@
 #include "common/core/error.h"
 #include "common/core/timer.h"
 #include "precompute/full_space/scene_setup.h"
+#include "runtime/scene/keyed_settings.h"
 #include "runtime/scene/obstacle_loader.h"
 #include "runtime/scene/samples.h"
 #include "runtime/sim/frame/world_vertices.h"
@@ -102,6 +103,12 @@ FullSpaceModel model_of(const SceneConfig& config, const ReducedModel& data,
   return build_full_space_model(data, options);
 }
 
+void require_no_keys(const SceneConfig& config) {
+  if (const std::string keys = place_of_keys(config); !keys.empty())
+    throw InputError({config.file.string(), keys, "a value: studies take no keys", "keys",
+                      "measure scenes with the values between the keys, one by one"});
+}
+
 // [n] shares of the mass in the motion of the centre [kg].
 Eigen::VectorXd vertex_masses(const ReducedModel& data) {
   const SparseMatrix mass = scalar_mass(data.object->mesh, data.object->materials.density);
@@ -180,9 +187,7 @@ std::string target_of(const runtime::LoadedScene& loaded) {
 }
 
 ReducedRun run_reduced(const SceneConfig& config, const std::vector<double>& times) {
-  if (const std::string keys = place_of_keys(config); !keys.empty())
-    throw InputError({config.file.string(), keys, "a value: studies take no keys", "keys",
-                      "measure scenes with the values between the keys, one by one"});
+  require_no_keys(config);
   const runtime::LoadedScene loaded = runtime::load_run(config);
   runtime::State state = loaded.start;
   Stepper stepper(loaded, state);
@@ -209,9 +214,20 @@ FullSpaceRun::FullSpaceRun(const SceneConfig& config, const ReducedModel& data,
                            const std::vector<PoseCoordinates>& coordinates)
     : model(model_of(config, data, coordinates)),
       scene(full_space_scene(config, runtime::make_obstacles(config), model)),
+      keys(runtime::make_keys(config)),
       state(full_space_start(config, model, start_of(config, data))),
       stepper(model) {
+  keys.apply_start(scene.gravity, scene.examples);
   stepper.set(scene);
+}
+
+FullSpaceReport FullSpaceRun::step() {
+  if (!keys.empty()) {
+    if (keys.apply(model.frame.has_value(), state.step, scene.time_step, scene.gravity, scene.examples))
+      state.begins_anew = true;
+    stepper.set(scene);
+  }
+  return stepper.step(state);
 }
 
 FullSpaceReport FullSpaceRun::sound_step() {
@@ -222,6 +238,7 @@ FullSpaceReport FullSpaceRun::sound_step() {
 
 BodyFrames run_full_space(const SceneConfig& config, const ReducedModel& data, const std::vector<double>& times,
                           const std::vector<PoseCoordinates>& coordinates) {
+  require_no_keys(config);
   FullSpaceRun body(config, data, coordinates);
   CentreVelocity centre;
   if (!config.obstacles.empty() && body.model.frame)

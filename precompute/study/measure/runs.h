@@ -37,22 +37,24 @@ std::string target_of(const runtime::LoadedScene& loaded);
 ReducedRun run_reduced(const SceneConfig& config, const std::vector<double>& times);
 
 /// The same in full space, of the body of a whole bundle, from the deformation that the reduced scene begins at.
-/// `coordinates`, as FullSpaceOptions has them, hold all targets; none: all poses that descriptors stand for.
+/// `coordinates`, as FullSpaceOptions has them, hold all targets; none: all poses that descriptors stand for. Both
+/// throw InputError at a setting with keys.
 BodyFrames run_full_space(const SceneConfig& config, const ReducedModel& data, const std::vector<double>& times,
                           const std::vector<PoseCoordinates>& coordinates = {});
 
-/// A body in full space, ready to step.
+/// A body in full space, ready to step; settings with keys change as the run time's do.
 struct FullSpaceRun {
-  /// As run_full_space() steps it.
+  /// As run_full_space() steps it, but for keys.
   FullSpaceRun(const SceneConfig& config, const ReducedModel& data,
                const std::vector<PoseCoordinates>& coordinates = {});
 
-  FullSpaceReport step() { return stepper.step(state); }
+  FullSpaceReport step();
   /// Throws WorkError at a number that is not finite.
   FullSpaceReport sound_step();
 
   FullSpaceModel model;
-  FullSpaceScene scene;
+  FullSpaceScene scene;  ///< in the last step; before the first at time 0
+  runtime::SceneKeys keys;
   FullSpaceState state;
   FullSpaceStepper stepper;
 };

@@ -52,15 +52,12 @@ bool SceneKeys::empty() const noexcept {
   return gravity.empty() && std::ranges::all_of(examples, [](const ExampleKeys& keys) { return keys.empty(); });
 }
 
-void SceneKeys::set(const Model& model, double midpoint, double end, StepScene& scene) const noexcept {
-  if (!gravity.empty()) {
-    const bool is_free = model.frame->rigid_unknowns() > 0;
-    gravity.sample(is_free ? midpoint : time_of(gravity, midpoint, end), scene.gravity);
-    scene.gravity_force.noalias() = model.gravity_load.transpose() * scene.gravity;
-  }
+void SceneKeys::set(bool is_free, double midpoint, double end, Eigen::Vector3d& gravity_now,
+                    std::span<ExampleSettings> examples_now) const noexcept {
+  if (!gravity.empty()) gravity.sample(is_free ? midpoint : time_of(gravity, midpoint, end), gravity_now);
   for (std::size_t i = 0; i < examples.size(); ++i) {
     const ExampleKeys& keys = examples[i];
-    ExampleSettings& settings = scene.examples[i];
+    ExampleSettings& settings = examples_now[i];
     sample_number(keys.stiffness, midpoint, end, settings.stiffness);
     sample_number(keys.damping, midpoint, end, settings.damping);
     sample_number(keys.bias, midpoint, end, settings.bias);
@@ -68,18 +65,36 @@ void SceneKeys::set(const Model& model, double midpoint, double end, StepScene& 
   }
 }
 
+void SceneKeys::weigh(const Model& model, StepScene& scene) const noexcept {
+  if (!gravity.empty()) scene.gravity_force.noalias() = model.gravity_load.transpose() * scene.gravity;
+}
+
 bool SceneKeys::jumps(double from, double to) const noexcept {
   return gravity.jumps(from, to) ||
          std::ranges::any_of(examples, [&](const ExampleKeys& keys) { return any_jumps(keys, from, to); });
 }
 
-void SceneKeys::apply(const Model& model, std::int64_t steps, StepScene& scene) const noexcept {
-  if (empty()) return;
-  const double dt = scene.time_step, start = static_cast<double>(steps) * dt, midpoint = start + 0.5 * dt;
-  set(model, midpoint, static_cast<double>(steps + 1) * dt, scene);
-  scene.begins_anew = jumps(midpoint - dt, midpoint);
+bool SceneKeys::apply(bool is_free, std::int64_t steps, double time_step, Eigen::Vector3d& gravity_now,
+                      std::span<ExampleSettings> examples_now) const noexcept {
+  const double start = static_cast<double>(steps) * time_step, midpoint = start + 0.5 * time_step;
+  set(is_free, midpoint, static_cast<double>(steps + 1) * time_step, gravity_now, examples_now);
+  return jumps(midpoint - time_step, midpoint);
 }
 
-void SceneKeys::apply_start(const Model& model, StepScene& scene) const noexcept { set(model, 0, 0, scene); }
+void SceneKeys::apply_start(Eigen::Vector3d& gravity_now, std::span<ExampleSettings> examples_now) const noexcept {
+  set(false, 0, 0, gravity_now, examples_now);
+}
+
+void SceneKeys::apply(const Model& model, std::int64_t steps, StepScene& scene) const noexcept {
+  if (empty()) return;
+  const bool is_free = model.frame->rigid_unknowns() > 0;
+  scene.begins_anew = apply(is_free, steps, scene.time_step, scene.gravity, scene.examples);
+  weigh(model, scene);
+}
+
+void SceneKeys::apply_start(const Model& model, StepScene& scene) const noexcept {
+  apply_start(scene.gravity, scene.examples);
+  weigh(model, scene);
+}
 
 }  // namespace exmat::runtime

@@ -70,5 +70,38 @@ TEST(RollOut, MeasuresWhatABasisLeavesOut) {
   EXPECT_GT(bar.model.object->mesh.vertices(error.worst_vertex, 0), 0.9);
 }
 
+// The mode that a basis of one has bends the bar far; along the stiff axis it does not move at all. The figure is that
+// of the kind which the basis lacks, however little that moves the body, unless rounding is all that moves it.
+TEST(RollOut, IsThatOfTheWorstKindOfLoad) {
+  test::Bar bar = test::make_bar({.cells = {3, 1, 1}, .linear_modes = 1});
+  const FullSpaceModel full = build_full_space_model(bar.model);
+  const TrainingRunOptions options{.angular_frequency = 2 * std::numbers::pi * bar.model.modal->frequencies[0],
+                                   .positions = true};
+  const double period = 2 * std::numbers::pi / options.angular_frequency;
+  Segment along, bending;
+  along.kind = "along";
+  bending.kind = "bending";
+  along.duration = bending.duration = 0.2 * period;
+  along.gravity = {5, 0, 0};
+  // The force of the mode's own shape.
+  const Eigen::VectorXd mode = full.system.full_mass * bar.model.modal->basis.col(0);
+  for (Eigen::Index v = 0; v < mode.size() / 3; ++v) bending.forces.push_back({{v}, 20 * mode.segment<3>(3 * v)});
+  const auto errors = [&](const std::vector<Chain>& chains) {
+    const TrainingRuns runs = run_segments(full, chains, options);
+    return roll_out(bar.model, EnergyReference::kExample, chains, runs, full.system.full_mass, options);
+  };
+  const RollOut alone = errors({{along}}), other = errors({{bending}});
+  ASSERT_LE(other.shape, 0.5 * alone.shape) << "the test would not notice";
+  for (const std::vector<Chain>& chains : {std::vector<Chain>{{along}, {bending}}, {{bending}, {along}}}) {
+    const RollOut both = errors(chains);
+    EXPECT_EQ(both.kind, "along");
+    EXPECT_DOUBLE_EQ(both.shape, alone.shape);
+    EXPECT_DOUBLE_EQ(both.settled, alone.settled);
+    EXPECT_EQ(both.worst_distance, std::max(alone.worst_distance, other.worst_distance));
+  }
+  along.gravity *= 1e-9;
+  EXPECT_EQ(errors({{along}, {bending}}).kind, "bending");
+}
+
 }  // namespace
 }  // namespace exmat::precompute

@@ -51,20 +51,30 @@ TEST(TrainingLoads, SayWhetherTheyDeformTheBody) {
   EXPECT_TRUE(loads.deforms(true));
 }
 
-TEST(TrainingLoads, AreNamedAsTriedOrNot) {
+std::vector<std::string> names_of(const std::vector<LoadKind>& kinds) {
+  std::vector<std::string> names;
+  for (const LoadKind& kind : kinds) names.push_back(kind.name);
+  return names;
+}
+
+TEST(TrainingLoads, AreTakenApartByKind) {
   const TrainingBody body{.free = false, .size = 1, .angular_frequency = 10, .groups = {""}};
   const TrainingLoads unknown = unknown_loads(body);
-  // kappa: 40 omega_1^2 times exp(-2) to exp(2).
-  EXPECT_EQ(tried_text(unknown, false),
-            "gravity of 9.81 m/s^2 in any direction, example forces of kappa 5.4e+02 to 3e+04 1/s^2 and bias 0.5 to 1, "
-            "pushes on patches of the surface");
-  EXPECT_EQ(untried_text(unknown, false), "contact, stronger or weaker ones");
-  EXPECT_EQ(untried_text({}, false), "gravity, example forces, forces on vertices, contact, stronger or weaker ones");
+  const std::vector<LoadKind> kinds = kinds_of(unknown, false);
+  ASSERT_EQ(names_of(kinds), (std::vector<std::string>{"gravity", "example forces", "forces on vertices"}));
+  EXPECT_EQ(kinds[0].loads.gravity, unknown.gravity);
+  EXPECT_FALSE(kinds[0].loads.patches);
+  EXPECT_FALSE(runtime::acts(kinds[0].loads.examples.front()));
+  EXPECT_TRUE(kinds[1].loads.gravity.isZero(0));
+  EXPECT_EQ(kinds[1].loads.examples.front().stiffness, 40 * 10 * 10);  // 40 omega_1^2
+  EXPECT_TRUE(kinds[2].loads.patches);
+  EXPECT_EQ(kinds[2].loads.examples.size(), 1U) << "one for each of the body's";
+
   TrainingLoads thrown;
+  thrown.gravity = {0, 0, -9};
   thrown.obstacle.emplace();
   thrown.velocity = {0, 0, -3};
-  EXPECT_EQ(tried_text(thrown, true), "throws at a plane with 3 m/s");
-  EXPECT_EQ(untried_text(thrown, true), "example forces, forces on vertices, stronger or weaker ones");
+  EXPECT_EQ(names_of(kinds_of(thrown, true)), std::vector<std::string>{"throws"}) << "gravity deforms no free body";
 }
 
 TEST(TrainingPlan, TakesTheSceneThenTheAssetThenWhatThereIs) {
