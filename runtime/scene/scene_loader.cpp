@@ -160,12 +160,9 @@ std::optional<BonePlay> bone_play(const SceneConfig& config, const LoadedScene& 
   for (std::size_t i = 0; i < body.bones.size(); ++i) {
     const std::size_t bone =
         find_joint(config, loaded, body.bones[i].joint, fmt::format("{}/body/bones/{}/joint", config.place, i));
-    const Skeleton& skeleton = *loaded.model->skeleton;
-    play.keys.push_back({skeleton.branch(bone), skeleton.axes(bone), make_motion(body.bones[i].motion)});
+    play.add_keys(*loaded.model->skeleton, bone, make_motion(body.bones[i].motion));
   }
   if (loaded.model->skeleton) play.bound = loaded.model->skeleton->bound();
-  // A bone has a smaller branch than those that it hangs on.
-  std::ranges::stable_sort(play.keys, {}, [](const BoneKeys& own) { return own.branch.size(); });
   return play;
 }
 
