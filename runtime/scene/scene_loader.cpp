@@ -142,7 +142,7 @@ std::size_t find_joint(const SceneConfig& config, const LoadedScene& loaded, con
   const std::string file = config.file.string(), bundle = config.bundle.string();
   const Skeleton* const skeleton = loaded.model->skeleton.get();
   if (skeleton == nullptr)
-    throw InputError({file, place, "a bundle of a surface with bones", bundle + ", which has none", ""});
+    throw InputError({file, place, "a bundle of a body with bones", bundle + ", which has none", ""});
   const std::vector<std::string>& names = skeleton->names();
   const auto found = std::ranges::find(names, name);
   if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
@@ -301,7 +301,7 @@ void check_animation(const SceneConfig& config, const LoadedScene& loaded) {
   const std::string place = config.place + "/body/animation";
   const Skeleton* skeleton = loaded.model->skeleton.get();
   if (skeleton == nullptr)
-    throw InputError({config.file.string(), place, "a bundle of a surface with bones",
+    throw InputError({config.file.string(), place, "a bundle of a body with bones",
                       config.bundle.string() + ", which has none", ""});
   if (skeleton->find_animation(config.body.animation->name) != nullptr) return;
   std::vector<std::string> names;
