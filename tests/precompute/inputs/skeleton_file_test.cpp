@@ -82,6 +82,13 @@ TEST_F(TetBones, AreBoundAndWeightedAsTheFileSays) {
   EXPECT_EQ(skeleton.first_frames, IndexVector::Zero(1));
 }
 
+TEST_F(TetBones, MayHaveSeveralRoots) {
+  bones_["joints"][0].erase("parent");
+  const SkeletonData skeleton = *read().skeleton;
+  EXPECT_THAT(skeleton.bones, ElementsAre("upper", "lower"));
+  EXPECT_EQ(skeleton.parents, IndexVector::Constant(2, -1));
+}
+
 // Cells are a sixth of a metre across: a vertex beside the middle is 1/6 m from the axis and 1/3 m from the surface.
 // Of the planes at the ends, the first has the joint in its middle, and the last is beyond the axis.
 TEST_F(TetBones, HoldTheVerticesAboutTheirAxes) {
