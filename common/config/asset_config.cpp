@@ -99,6 +99,9 @@ class AssetReader {
       if (has_mesh && json.contains(member))
         refuse(fmt::format("/object/{}", member), "none beside object.mesh, which has its tets", "one");
     if (asset.cells && asset.cell_size) refuse("/object", "cells or cell_size", "both");
+    if (!json.contains("skeleton")) return;
+    if (has_surface) refuse("/object/skeleton", "none beside object.surface, whose glTF file has its bones", "one");
+    asset.object_skeleton = resolve_path(file_, json["skeleton"]);
   }
 
   TetSelection read_tets(const Json& json, const std::string& place) const {
@@ -316,6 +319,7 @@ std::vector<NamedFile> named_files(const AssetConfig& asset) {
   };
   add(asset.object_mesh, asset.object_surface ? "/object/surface" : "/object/mesh",
       asset.object_surface ? "a surface" : "a mesh of tets");
+  if (asset.object_skeleton) add(*asset.object_skeleton, "/object/skeleton", "a JSON file of bones");
   if (asset.render_mesh) add(*asset.render_mesh, "/object/render_mesh", "a surface");
   if (asset.fixed) add_ids(*asset.fixed, "/object/fixed");
   for (std::size_t i = 0; i < asset.material_regions.size(); ++i)

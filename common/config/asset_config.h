@@ -126,8 +126,9 @@ struct AssetConfig {
   std::string name;
   std::filesystem::path object_mesh;  ///< tets, or, where object_surface is there, that
   std::optional<std::filesystem::path> object_surface;
-  std::optional<int> cells;         ///< number of enclosing tets, about; both absent: the default
-  std::optional<double> cell_size;  ///< [m]
+  std::optional<std::filesystem::path> object_skeleton;  ///< bones of tets
+  std::optional<int> cells;                              ///< number of enclosing tets, about; both absent: the default
+  std::optional<double> cell_size;                       ///< [m]
   MaterialConfig material;
   std::vector<MaterialRegionConfig> material_regions;  ///< later ones win
   Formulation formulation = Formulation::kSmoothed;

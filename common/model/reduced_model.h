@@ -264,7 +264,8 @@ struct RenderData {
   IndexVector look_vertices;  ///< p, which vertex is the first of each primitive; the others follow it
   /// 3p x 3 (dataset p 3 3), from displacements in the primitive's mesh to those here.
   RowMatrix look_frames = RowMatrix(0, 3);
-  /// v x h, bones of the skeleton that each vertex hangs on, as its file has it, and by how much; h is 0 without bones.
+  /// v x h, bones of the skeleton that each vertex hangs on, as its file or its tet has it, and by how much; h is 0
+  /// without bones.
   IndexMatrix bones;
   RowMatrix bone_weights;
 };

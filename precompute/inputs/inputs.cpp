@@ -15,6 +15,7 @@
 #include "precompute/inputs/object_size.h"
 #include "precompute/inputs/object_skeleton.h"
 #include "precompute/inputs/object_surface.h"
+#include "precompute/inputs/skeleton_file.h"
 #include "precompute/mesh_io/gltf_look.h"
 #include "precompute/mesh_io/mesh_file.h"
 #include "precompute/mesh_io/surface_file.h"
@@ -130,6 +131,17 @@ struct FileNumbers {
 
 FileNumbers numbers_of(const CheckedMesh& checked) {
   return {checked.report.kept_vertices, checked.file_vertices.rows()};
+}
+
+// The bones of a JSON file for the vertices that the check of the mesh has left.
+SkeletonData skeleton_of_tets(const std::filesystem::path& path, const CheckedMesh& checked, InputFiles& files) {
+  SkeletonData skeleton = read_skeleton(path, checked.file_vertices.rows());
+  files.push_back(path);
+  skeleton.weights = RowMatrix(skeleton.weights(checked.report.kept_vertices, Eigen::all));
+  if (skeleton.weights.isZero(0))
+    throw InputError({path.string(), "/weights", "vertices that belong to tets", "none", ""});
+  fill_weights(checked.file.mesh, skeleton.weights);
+  return skeleton;
 }
 
 // Adds how the vertices of a render mesh hang on bones, by weights of each bone [v x b].
@@ -447,7 +459,14 @@ ObjectInput read_object(const AssetConfig& asset, InputFiles& files, StageCache&
   object.fixed = flag(asset.fixed, 0);
   if (object.surface && object.surface->file().skeleton) {
     object.skeleton = skeleton_of_cage(*object.surface);
-    if (!asset.fixed) object.fixed = pin_to_bones(*object.surface, *object.skeleton, object.warnings);
+    if (!asset.fixed)
+      object.fixed = pin_to_bones(object.mesh.vertices, object.surface->tree(), *object.skeleton, object.warnings);
+  } else if (asset.object_skeleton) {
+    object.skeleton = skeleton_of_tets(*asset.object_skeleton, checked, files);
+    if (!asset.fixed)
+      object.fixed =
+          pin_to_bones(object.mesh.vertices, SurfaceTree(object.mesh.vertices, surface_triangles(object.mesh.tets)),
+                       *object.skeleton, object.warnings);
   }
   if (asset.clamp_follows && !object.skeleton) object.skeleton = clamp_bone(object.mesh, object.fixed);
   object.contact = flag(asset.contact_vertices, 1);
@@ -498,6 +517,7 @@ RenderData read_render_mesh(const AssetConfig& asset, const ObjectInput& object,
   render.bones.resize(render.tets.size(), 0);
   render.bone_weights.resize(render.tets.size(), 0);
   if (is_object && object.surface->file().skeleton) add_bones(object.surface->file().skeleton->weights, render);
+  if (asset.object_skeleton) add_bones(embedding.points.interpolation(object.mesh) * object.skeleton->weights, render);
   add_look(asset, files, warnings, render);
   return render;
 }

@@ -26,7 +26,7 @@ struct ObjectInput {
   std::vector<std::int32_t> kept_vertices, kept_tets;  ///< new index -> index in the file
   VertexArray file_positions;                          ///< positions of all vertices in the file
   std::vector<std::vector<std::int64_t>> pushed;       ///< vertices of each of the forces of basis.loads
-  std::optional<SkeletonData> skeleton{};              ///< bones that a surface has, for the vertices of the mesh
+  std::optional<SkeletonData> skeleton{};              ///< bones that it hangs on, for the vertices of the mesh
   std::vector<std::string> warnings{};                 ///< warnings of its bones
   std::shared_ptr<const ObjectSurface> surface{};      ///< that the mesh encloses; none where tets were given
   VertexMarks marks{};                                 ///< marks of that surface at the vertices

@@ -13,8 +13,9 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr double kHold = 1e3;        // of the surface beside the field's own stiffness, over an edge's length
+constexpr double kHold = 1e3;        // of given weights beside the field's own stiffness, over an edge's length
 constexpr Eigen::Index kFewest = 4;  // vertices that hold a bone: three would leave it a turn
+constexpr double kOnLine = 1e-6;     // distance from a line over the length there, of points that are on it
 
 Eigen::VectorXd vertex_areas(const SurfaceMesh& surface) {
   const TriangleSamples samples = triangle_samples(surface.vertices, surface.triangles);
@@ -46,31 +47,71 @@ std::vector<std::vector<Eigen::Vector3d>> axis_ends(const SkeletonData& skeleton
   return ends;
 }
 
-}  // namespace
+double usual_edge(const TetMesh& mesh) {
+  return bounding_box_diagonal(mesh.vertices) / std::cbrt(static_cast<double>(mesh.vertex_count()));
+}
 
-SkeletonData skeleton_of_cage(const ObjectSurface& surface) {
-  SkeletonData skeleton = *surface.file().skeleton;
-  const TetMesh& cage = surface.cage().mesh;
-  const Eigen::SparseMatrix<double> at = surface.embedding().points.interpolation(cage);
-  const double edge = bounding_box_diagonal(cage.vertices) / std::cbrt(static_cast<double>(cage.vertex_count()));
-  const Eigen::VectorXd hold = kHold / edge * vertex_areas(surface.file().mesh);
-  const Eigen::SparseMatrix<double> matrix = Eigen::SparseMatrix<double>(laplacian_stiffness(cage)) +
+// Weights at the vertices [n x b] of least Dirichlet energy. Points that the matrix `at` [k x n] interpolates hold them
+// at `given` [k x b], by the area of each [m^2].
+RowMatrix spread_weights(const TetMesh& mesh, const Eigen::SparseMatrix<double>& at, const Eigen::VectorXd& areas,
+                         const RowMatrix& given) {
+  const Eigen::VectorXd hold = kHold / usual_edge(mesh) * areas;
+  const Eigen::SparseMatrix<double> matrix = Eigen::SparseMatrix<double>(laplacian_stiffness(mesh)) +
                                              Eigen::SparseMatrix<double>(at.transpose() * hold.asDiagonal() * at);
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(matrix);
   if (factor.info() != Eigen::Success)
     throw WorkError(
         "the weights of bones cannot be carried to the cage: parts of it are near no vertex of the surface");
-  RowMatrix weights = factor.solve(Eigen::MatrixXd(at.transpose() * (hold.asDiagonal() * skeleton.weights)));
+  RowMatrix weights = factor.solve(Eigen::MatrixXd(at.transpose() * (hold.asDiagonal() * given)));
   weights = (weights.array() < kLeastWeight).select(0, weights);
   for (auto row : weights.rowwise()) row /= row.sum();
-  skeleton.weights = std::move(weights);
+  return weights;
+}
+
+// A vertex that a bone may hold: the least first.
+struct OwnVertex {
+  double depth, to_axis;  // distance from the axis over that and the distance from the surface; distance [m]
+  Eigen::Index vertex;
+  auto operator<=>(const OwnVertex&) const = default;
+};
+
+// True if the vertices lie on a line, about which what they hold may turn.
+bool are_on_a_line(const VertexArray& vertices) {
+  const VertexArray from_first = vertices.rowwise() - vertices.row(0);
+  Eigen::Index farthest = 0;
+  const double length = from_first.rowwise().norm().maxCoeff(&farthest);
+  const Eigen::Vector3d line = from_first.row(farthest);
+  for (const Eigen::Vector3d way : from_first.rowwise())
+    if (line.cross(way).norm() > kOnLine * length * length) return false;
+  return true;
+}
+
+}  // namespace
+
+SkeletonData skeleton_of_cage(const ObjectSurface& surface) {
+  SkeletonData skeleton = *surface.file().skeleton;
+  const TetMesh& cage = surface.cage().mesh;
+  skeleton.weights = spread_weights(cage, surface.embedding().points.interpolation(cage),
+                                    vertex_areas(surface.file().mesh), skeleton.weights);
   return skeleton;
 }
 
-FlagVector pin_to_bones(const ObjectSurface& surface, SkeletonData& skeleton, std::vector<std::string>& warnings) {
-  const VertexArray& vertices = surface.cage().mesh.vertices;
+void fill_weights(const TetMesh& mesh, RowMatrix& weights) {
+  const Eigen::VectorXd given = (weights.rowwise().sum().array() > 0).cast<double>();
+  if (given.all()) return;
+  Eigen::SparseMatrix<double> at(given.size(), given.size());
+  at.setIdentity();
+  const double edge = usual_edge(mesh);
+  const RowMatrix spread = spread_weights(mesh, at, edge * edge * given, weights);
+  for (Eigen::Index v = 0; v < given.size(); ++v)
+    if (given[v] == 0) weights.row(v) = spread.row(v);
+}
+
+FlagVector pin_to_bones(const VertexArray& vertices, const SurfaceTree& surface, SkeletonData& skeleton,
+                        std::vector<std::string>& warnings) {
   const auto ends = axis_ends(skeleton, vertices);
-  std::vector<std::vector<std::pair<double, Eigen::Index>>> own(skeleton.bones.size());  // depth and vertex
+  const double on_axis = kOnLine * bounding_box_diagonal(vertices);
+  std::vector<std::vector<OwnVertex>> own(skeleton.bones.size());
   for (Eigen::Index v = 0; v < vertices.rows(); ++v) {
     Eigen::Index bone = 0;
     if (skeleton.weights.row(v).maxCoeff(&bone) < kOwnWeight) continue;
@@ -79,16 +120,18 @@ FlagVector pin_to_bones(const ObjectSurface& surface, SkeletonData& skeleton, st
     double to_axis = (point - joint).norm();
     for (const Eigen::Vector3d& end : ends[static_cast<std::size_t>(bone)])
       to_axis = std::min(to_axis, distance_to_segment(point, joint, end));
-    const double to_surface = (surface.tree().nearest(point).position - point).norm();
-    own[static_cast<std::size_t>(bone)].emplace_back(to_axis / (to_axis + to_surface), v);
+    const double to_surface = (surface.nearest(point).position - point).norm();
+    own[static_cast<std::size_t>(bone)].push_back(
+        {to_axis > on_axis ? to_axis / (to_axis + to_surface) : 0, to_axis, v});
   }
   FlagVector pinned = FlagVector::Zero(vertices.rows());
   std::string none;
   for (std::size_t b = 0; b < own.size(); ++b) {
     std::ranges::sort(own[b]);
-    for (Eigen::Index k = 0; k < std::ssize(own[b]); ++k) {
-      const auto [depth, vertex] = own[b][static_cast<std::size_t>(k)];
-      if (depth > kDepth && k >= kFewest) break;
+    std::vector<Eigen::Index> held;
+    for (const auto [depth, to_axis, vertex] : own[b]) {
+      if (depth > kDepth && std::ssize(held) >= kFewest && !are_on_a_line(vertices(held, Eigen::all))) break;
+      held.push_back(vertex);
       pinned[vertex] = 1;
       skeleton.weights.row(vertex).setZero();
       skeleton.weights(vertex, static_cast<Eigen::Index>(b)) = 1;
@@ -99,8 +142,8 @@ FlagVector pin_to_bones(const ObjectSurface& surface, SkeletonData& skeleton, st
                         vertices.rows()));
   if (!none.empty()) {
     warnings.push_back(
-        fmt::format("no vertex of the cage hangs on one of these bones alone, and they move only the "
-                    "flesh about them by their weights: {}; more cells would find some",
+        fmt::format("no vertex of the tets hangs on one of these bones alone, and they move only the "
+                    "flesh about them by their weights: {}; more tets would find some",
                     none));
     log::warning(warnings.back());
   }

@@ -15,10 +15,15 @@ namespace exmat::precompute {
 SkeletonData skeleton_of_cage(const ObjectSurface& surface);
 inline constexpr double kLeastWeight = 0.01;
 
-/// 1 for the vertices that bones hold by themselves: those that hang on one bone with at least kOwnWeight and lie
-/// nearer to its axis than to the surface, in the proportion kDepth; of a bone with fewer than four of these its four
-/// deepest. They get that bone's weight alone. Warns of bones that hold none.
-FlagVector pin_to_bones(const ObjectSurface& surface, SkeletonData& skeleton, std::vector<std::string>& warnings);
+/// Fills rows of 0 of the weights [n x b], whose other rows add up to 1, at least one of them: between these the field
+/// of each bone is harmonic, as that of a cage.
+void fill_weights(const TetMesh& mesh, RowMatrix& weights);
+
+/// 1 for the vertices [n x 3] that bones hold by themselves: those that hang on one bone with at least kOwnWeight and
+/// lie nearer to its axis than to the surface, in the proportion kDepth. If these are fewer than four or lie on a line,
+/// the bone holds the next deepest, too. They get that bone's weight alone. Warns of bones that hold none.
+FlagVector pin_to_bones(const VertexArray& vertices, const SurfaceTree& surface, SkeletonData& skeleton,
+                        std::vector<std::string>& warnings);
 inline constexpr double kOwnWeight = 0.95, kDepth = 0.35;
 
 /// One bone, "clamp", that holds all of the mesh, with its joint in the middle of the fixed vertices.

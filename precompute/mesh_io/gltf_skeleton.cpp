@@ -4,20 +4,17 @@
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
-#include <set>
 
 #include "common/elastic/polar_rotation.h"
+#include "precompute/mesh_io/animation_frames.h"
 #include "precompute/mesh_io/gltf_nodes.h"
 
 namespace exmat::precompute {
 namespace {
 
-constexpr double kFrameRate = 60;     // of poses between keys [1/s]
 constexpr double kBeforeJump = 1e-4;  // [s] that a pose is held to before a step
 constexpr double kSameBind = 1e-3;    // of the farthest joint, that skins may disagree by
 constexpr double kStretch = 0.01;     // of a bone, that is reported
-constexpr double kMostNumbers = 2e7;  // of all poses
-constexpr double kLongest = 3600;     // [s]
 constexpr std::array<std::string_view, 3> kMoved{"translation", "rotation", "scale"};
 constexpr std::array<std::string_view, 3> kWays{"LINEAR", "STEP", "CUBICSPLINE"};
 
@@ -183,45 +180,35 @@ std::vector<GltfSkeleton::Channel> GltfSkeleton::read_channels(const tinygltf::A
     if (count == 0 || channel.values.rows() != count * (channel.way == "CUBICSPLINE" ? 3 : 1))
       fail_in_gltf(file_, at, "a value for each time", fmt::format("{} for {}", channel.values.rows(), count));
     if ((keys.head(count - 1).array() >= keys.tail(count - 1).array()).any() || keys[0] < 0 ||
-        keys[count - 1] > kLongest)
-      fail_in_gltf(file_, at, fmt::format("times from 0 to {:g} s that ascend", kLongest), "others");
+        keys[count - 1] > kLongestAnimation)
+      fail_in_gltf(file_, at, fmt::format("times from 0 to {:g} s that ascend", kLongestAnimation), "others");
     channels.push_back(std::move(channel));
   }
   return channels;
 }
 
-std::vector<double> GltfSkeleton::frame_times(const std::vector<Channel>& channels) {
-  std::set<double> times{0};
-  double end = 0;
+std::set<double> GltfSkeleton::key_times(const std::vector<Channel>& channels) {
+  std::set<double> times;
   for (const Channel& channel : channels)
     for (const double key : channel.times) {
-      end = std::max(end, key);
       times.insert(key);
       if (channel.way == "STEP" && key > kBeforeJump) times.insert(key - kBeforeJump);
     }
-  const auto frames = static_cast<int>(std::ceil(end * kFrameRate));
-  for (int frame = 1; frame < frames; ++frame) times.insert(frame / kFrameRate);
-  std::vector<double> apart;
-  for (const double time : times)
-    if (apart.empty() || time - apart.back() > 1e-9) apart.push_back(time);
-  return apart;
+  return times;
 }
 
 void GltfSkeleton::add_animations(SkeletonData& data, std::vector<std::string>& remarks) const {
-  std::vector<double> times, poses;
-  std::vector<std::int32_t> first_frames{0};
+  AnimationFrames frames(size());
   double stretch = 0;
   std::set<std::string> taken;
   for (std::size_t a = 0; a < model_.animations.size(); ++a) {
     const tinygltf::Animation& animation = model_.animations[a];
     const std::string place = place_of("animations", a);
     const std::vector<Channel> channels = read_channels(animation, place);
-    const std::vector<double> own = frame_times(channels);
-    if (static_cast<double>((times.size() + own.size()) * 7 * size()) > kMostNumbers)
-      fail_in_gltf(file_, place, fmt::format("at most {:g} numbers in the poses of all animations", kMostNumbers),
-                   "more", "export fewer or shorter ones");
+    const std::string name =
+        unique_name(animation.name.empty() ? fmt::format("animation {}", a) : animation.name, taken);
     std::vector<tinygltf::Node> nodes = model_.nodes;
-    for (const double time : own) {
+    for (const double time : frames.begin(name, key_times(channels), file_, place)) {
       for (const Channel& channel : channels) {
         tinygltf::Node& node = nodes[channel.node];
         auto& moved = channel.path == "rotation" ? node.rotation
@@ -230,22 +217,14 @@ void GltfSkeleton::add_animations(SkeletonData& data, std::vector<std::string>& 
         const Eigen::VectorXd value = channel.at(time);
         moved.assign(value.begin(), value.end());
       }
-      times.push_back(time);
       const std::vector<Eigen::Affine3d> to_scene = transforms(nodes);
       for (std::size_t b = 0; b < size(); ++b) {
         const Eigen::Affine3d& now = to_scene[static_cast<std::size_t>(joints_[b])];
-        const Eigen::Vector3d joint = now.translation();
-        const Eigen::Quaterniond turn = turn_of((now * binds_[b].inverse()).linear(), stretch);
-        poses.insert(poses.end(), {joint.x(), joint.y(), joint.z(), turn.w(), turn.x(), turn.y(), turn.z()});
+        frames.add(now.translation(), turn_of((now * binds_[b].inverse()).linear(), stretch));
       }
     }
-    first_frames.push_back(static_cast<std::int32_t>(times.size()));
-    data.animations.push_back(
-        unique_name(animation.name.empty() ? fmt::format("animation {}", a) : animation.name, taken));
   }
-  data.first_frames = Eigen::Map<const IndexVector>(first_frames.data(), std::ssize(first_frames));
-  data.times = Eigen::Map<const Eigen::VectorXd>(times.data(), std::ssize(times));
-  data.poses = Eigen::Map<const RowMatrix>(poses.data(), std::ssize(poses) / 7, 7);
+  frames.put_into(data);
   if (stretch > kStretch)
     remarks.push_back(fmt::format("animations stretch bones by up to {:.0f} %, which is left out: bones turn and move",
                                   100 * stretch));

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -51,7 +52,7 @@ class GltfSkeleton {
   std::vector<Eigen::Affine3d> transforms(const std::vector<tinygltf::Node>& nodes) const;
   void add_animations(SkeletonData& data, std::vector<std::string>& remarks) const;
   std::vector<Channel> read_channels(const tinygltf::Animation& animation, const std::string& place) const;
-  static std::vector<double> frame_times(const std::vector<Channel>& channels);
+  static std::set<double> key_times(const std::vector<Channel>& channels);
 
   const std::string& file_;
   const tinygltf::Model& model_;

@@ -142,7 +142,7 @@ std::size_t find_joint(const SceneConfig& config, const LoadedScene& loaded, con
   const std::string file = config.file.string(), bundle = config.bundle.string();
   const Skeleton* const skeleton = loaded.model->skeleton.get();
   if (skeleton == nullptr)
-    throw InputError({file, place, "a bundle of a surface with bones", bundle + ", which has none", ""});
+    throw InputError({file, place, "a bundle of a body with bones", bundle + ", which has none", ""});
   const std::vector<std::string>& names = skeleton->names();
   const auto found = std::ranges::find(names, name);
   if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
@@ -160,12 +160,9 @@ std::optional<BonePlay> bone_play(const SceneConfig& config, const LoadedScene& 
   for (std::size_t i = 0; i < body.bones.size(); ++i) {
     const std::size_t bone =
         find_joint(config, loaded, body.bones[i].joint, fmt::format("{}/body/bones/{}/joint", config.place, i));
-    const Skeleton& skeleton = *loaded.model->skeleton;
-    play.keys.push_back({skeleton.branch(bone), skeleton.axes(bone), make_motion(body.bones[i].motion)});
+    play.add_keys(*loaded.model->skeleton, bone, make_motion(body.bones[i].motion));
   }
   if (loaded.model->skeleton) play.bound = loaded.model->skeleton->bound();
-  // A bone has a smaller branch than those that it hangs on.
-  std::ranges::stable_sort(play.keys, {}, [](const BoneKeys& own) { return own.branch.size(); });
   return play;
 }
 
@@ -311,7 +308,7 @@ void check_animation(const SceneConfig& config, const LoadedScene& loaded) {
   const std::string place = config.place + "/body/animation";
   const Skeleton* skeleton = loaded.model->skeleton.get();
   if (skeleton == nullptr)
-    throw InputError({config.file.string(), place, "a bundle of a surface with bones",
+    throw InputError({config.file.string(), place, "a bundle of a body with bones",
                       config.bundle.string() + ", which has none", ""});
   if (skeleton->find_animation(config.body.animation->name) != nullptr) return;
   std::vector<std::string> names;

@@ -221,7 +221,7 @@ void check_closed(const Json& schema, const std::string& place) {
 }
 
 class ConfigSchema : public ::testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Each, ConfigSchema, ::testing::Values("asset", "scene", "study", "viewer_script"));
+INSTANTIATE_TEST_SUITE_P(Each, ConfigSchema, ::testing::Values("asset", "scene", "skeleton", "study", "viewer_script"));
 
 TEST_P(ConfigSchema, IsClosedAndDescribed) {
   const Json schema = Json::parse(embedded_schema(GetParam()));

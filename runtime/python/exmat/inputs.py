@@ -11,7 +11,7 @@ from .arrays import StrPath, array, cells, surface_arrays
 from .errors import InvalidArgument
 from .surfaces import write_glb
 
-PATHS = ("mesh", "surface", "render_mesh", "file", "landmarks", "asset", "scene", "bundle", "exact_examples", "poses")
+PATHS = ("mesh", "surface", "skeleton", "render_mesh", "file", "landmarks", "asset", "scene", "bundle", "exact_examples", "poses")
 _TOO_DEEP = "expected members as JSON has them, found some that are nested hundreds deep, or hold themselves"
 
 

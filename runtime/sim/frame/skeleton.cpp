@@ -81,6 +81,13 @@ const BoneAnimation* Skeleton::find_animation(const std::string& name) const noe
   return found == animations_.end() ? nullptr : &*found;
 }
 
+void BonePlay::add_keys(const Skeleton& skeleton, std::size_t bone, const RigidMotion& motion) {
+  BoneKeys own{skeleton.branch(bone), skeleton.axes(bone), motion};
+  // A bone has a smaller branch than those that it hangs on.
+  const auto size_of = [](const BoneKeys& other) { return other.branch.size(); };
+  keys.insert(std::ranges::upper_bound(keys, size_of(own), {}, size_of), std::move(own));
+}
+
 void BonePlay::sample(double time, BonePoses& poses) const noexcept {
   if (animation != nullptr) {
     double at = start + speed * time;

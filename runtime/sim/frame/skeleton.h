@@ -84,6 +84,8 @@ struct BonePlay {
   BonePoses bound{};             ///< poses where there is no animation
   std::vector<BoneKeys> keys{};  ///< a bone before those that it hangs on
 
+  /// Adds keys of a bone of the skeleton, which has none yet.
+  void add_keys(const Skeleton& skeleton, std::size_t bone, const RigidMotion& motion);
   void sample(double time, BonePoses& poses) const noexcept;
 };
 

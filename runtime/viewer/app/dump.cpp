@@ -34,6 +34,7 @@ void dump(const Snapshot& snapshot, const Studio& studio, const PictureSize& pic
                               {"weights", body.weights},
                               {"contacts", body.contacts.size()}});
     if (!body.positions.empty()) json["bodies"].back()["positions"] = body.positions;
+    if (!body.bones.empty()) json["bodies"].back()["bones"] = body.bones;
   }
   json["hands"] = OrderedJson::array();
   for (const GripSnapshot& grip : snapshot.grips)

@@ -71,6 +71,9 @@ void Hand::use_key(Studio& studio, int key) {
     case GLFW_KEY_E:
       look.elements = !look.elements;
       break;
+    case GLFW_KEY_B:
+      look.bones = !look.bones;
+      break;
     case GLFW_KEY_X:
       look.examples = !look.examples;
       studio.frame_next = true;

@@ -10,6 +10,7 @@ namespace exmat::viewer {
 struct Look {
   Colouring colouring = Colouring::kPlain;
   bool surface = true, wireframe = false, elements = false, examples = false, targets = false;
+  bool bones = false;  ///< bones are shown, and joints can be dragged
   bool floor = true, shadow = true;
 
   SnapshotRequest request() const { return {colouring, elements, targets}; }

@@ -241,6 +241,8 @@ void Controls::draw_view(Studio& studio) {
   pair("examples", look.examples, "target", look.targets);
   if (look.examples != examples) studio.frame_next = true;
   pair("elements", look.elements, "floor", look.floor);
+  if (std::ranges::any_of(studio.shapes(), [](const auto& shape) { return shape->on_bones(); }))
+    ImGui::Checkbox("bones", &look.bones);
 }
 
 void Controls::draw_saving(Studio& studio) {

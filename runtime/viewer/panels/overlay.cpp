@@ -33,8 +33,27 @@ void draw_grips(const Style& style, const Snapshot& snapshot, Studio& studio, co
     list.AddCircle(at(*target), 7 * s, IM_COL32(255, 255, 255, 220), 0, 4 * s);
     list.AddCircle(at(*target), 7 * s, IM_COL32(213, 94, 0, 255), 0, 2 * s);
     const ImVec2 hand = at(*target);
-    if (studio.interface)
+    if (studio.interface && !grip.force.isZero(0))
       text_beside(list, {hand.x + 14 * s, hand.y - 8 * s}, with_unit(grip.force.norm(), "N"), style);
+  }
+}
+
+void draw_bones(const Style& style, const Snapshot& snapshot, const Studio& studio, const PictureSize& picture,
+                ImDrawList& list) {
+  const float s = style.scale;
+  for (std::size_t body = 0; body < snapshot.bodies.size(); ++body) {
+    const std::vector<std::int64_t>& parents = studio.shapes()[studio.kinds_of_bodies()[body]]->bone_parents;
+    const auto pixel = [&](std::size_t bone) {
+      return studio.camera().pixel(snapshot.bodies[body].joint(bone) + studio.offsets()[body], picture);
+    };
+    for (std::size_t bone = 0; bone < parents.size(); ++bone) {
+      const auto joint = pixel(bone);
+      if (!joint) continue;
+      const auto parent = parents[bone] < 0 ? std::nullopt : pixel(static_cast<std::size_t>(parents[bone]));
+      if (parent) list.AddLine(at(*parent), at(*joint), IM_COL32(0, 114, 178, 200), 2 * s);
+      list.AddCircleFilled(at(*joint), 6 * s, IM_COL32(255, 255, 255, 220));
+      list.AddCircleFilled(at(*joint), 4.5F * s, IM_COL32(0, 114, 178, 255));
+    }
   }
 }
 
@@ -78,15 +97,17 @@ void draw_scale(const Style& style, float most, Colouring colouring, const Pictu
 void draw_overlay(const Style& style, const Snapshot& snapshot, const SceneDrawing& drawing, Studio& studio,
                   const PictureSize& picture) {
   ImDrawList& list = *ImGui::GetBackgroundDrawList();
+  if (studio.look().bones) draw_bones(style, snapshot, studio, picture, list);
   draw_grips(style, snapshot, studio, picture, list);
   draw_names(style, drawing, studio, picture, list);
   if (studio.interface) draw_scale(style, drawing.most(), studio.look().colouring, picture, list);
 }
 
 void draw_help(const Style& style) {
-  constexpr std::array<std::pair<const char*, const char*>, 19> kKeys{
+  constexpr std::array<std::pair<const char*, const char*>, 21> kKeys{
       {{"drag a body", "pull at it; let go to throw it"},
        {"drag an obstacle", "push with it"},
+       {"drag a joint", "turn the bone that it hangs on; a root is shifted"},
        {"drag elsewhere", "look from another side"},
        {"right or middle button", "move the picture"},
        {"wheel", "nearer, farther"},
@@ -98,6 +119,7 @@ void draw_help(const Style& style) {
        {"C", "colour: plain, displacement, strain energy, contact force"},
        {"W", "wireframe"},
        {"E", "cubature elements"},
+       {"B", "bones, whose joints can be dragged"},
        {"X", "examples beside the body"},
        {"T", "the target where the body is"},
        {"G", "gravity on and off"},

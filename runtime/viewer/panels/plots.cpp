@@ -173,7 +173,7 @@ void draw_basis(const Style& style, const Snapshot& snapshot, const Studio& stud
   const auto full =
       std::ranges::count_if(snapshot.bodies, [](const BodySnapshot& body) { return !body.positions.empty(); });
   if (full > 0) {
-    const bool on_bones = std::ranges::any_of(studio.shapes(), [](const auto& shape) { return shape->on_bones; });
+    const bool on_bones = std::ranges::any_of(studio.shapes(), [](const auto& shape) { return shape->on_bones(); });
     heading(style, "All vertices");
     ImGui::TextWrapped("%s", full_space_text(snapshot, static_cast<std::size_t>(full), on_bones).c_str());
   }

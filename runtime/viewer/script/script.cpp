@@ -88,6 +88,7 @@ void ScriptPlayer::check() const {
     const Json& what = action.what;
     if (what.contains("grab")) {
       require_body(what["grab"], action.place + "/grab");
+      if (what["grab"].contains("joint")) joint_of(what["grab"], action.place + "/grab");
       hands.insert(what["grab"]["hand"].get<std::string>());
     }
     if (what.contains("move")) require_hand(what["move"]["hand"], action.place + "/move/hand");
@@ -154,10 +155,27 @@ void ScriptPlayer::act(const Script::Action& action) {
   if (what.contains("step")) studio_.runner().step(what["step"]);
 }
 
+/// The joint of its body that a grab names.
+std::size_t ScriptPlayer::joint_of(const Json& grab, const std::string& place) const {
+  const std::string name = grab["joint"];
+  const std::size_t body = grab.value("body", std::size_t{0});
+  const std::vector<std::string>& bones = studio_.shapes()[studio_.kinds_of_bodies()[body]]->bones;
+  const auto found = std::ranges::find(bones, name);
+  if (found == bones.end())
+    throw InputError({script_.file.string(), place + "/joint",
+                      bones.empty() ? "a body on bones" : fmt::format("a joint: {}", fmt::join(bones, ", ")),
+                      bones.empty() ? "one without" : '"' + name + '"', ""});
+  return static_cast<std::size_t>(found - bones.begin());
+}
+
 void ScriptPlayer::grab(const Json& grab) {
   Hand hand;
   const std::size_t body = grab.value("body", std::size_t{0});
-  hand.grip = studio_.grab_near(body, vector_of(grab["point"]));
+  if (grab.contains("joint"))
+    hand.grip =
+        studio_.runner().with([&](Simulation& simulation) { return simulation.grab_joint(body, joint_of(grab, "")); });
+  else
+    hand.grip = studio_.grab_near(body, vector_of(grab["point"]));
   const Snapshot snapshot = studio_.runner().with([](Simulation& simulation) { return simulation.snapshot({}); });
   for (const GripSnapshot& grip : snapshot.grips)
     if (grip.id == hand.grip) hand.at = grip.target - studio_.offsets()[body];
@@ -215,6 +233,7 @@ void ScriptPlayer::show(const Json& show) {
   take(show, "surface", look.surface);
   take(show, "wireframe", look.wireframe);
   take(show, "elements", look.elements);
+  take(show, "bones", look.bones);
   take(show, "examples", look.examples);
   take(show, "targets", look.targets);
   take(show, "floor", look.floor);

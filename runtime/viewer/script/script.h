@@ -54,6 +54,7 @@ class ScriptPlayer {
 
   void check() const;
   void act(const Script::Action& action);
+  std::size_t joint_of(const nlohmann::json& grab, const std::string& place) const;
   void grab(const nlohmann::json& grab);
   void set(const nlohmann::json& set);
   void show(const nlohmann::json& show);

@@ -51,7 +51,10 @@ BodyShape make_shape(const Model& model, const Surface& surface) {
   for (std::size_t i = 0; i + 2 < shape.rest.size(); i += 3)
     shape.bounds.add(Eigen::Map<const Eigen::Vector3d>(shape.rest.data() + i));
   shape.mass = mass_of(model);
-  shape.on_bones = model.bones() > 0;
+  for (std::size_t bone = 0; bone < model.bones(); ++bone) {
+    shape.bones.push_back(model.bone_name(bone));
+    shape.bone_parents.push_back(model.bone_parent(bone));
+  }
   return shape;
 }
 

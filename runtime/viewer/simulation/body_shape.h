@@ -26,9 +26,12 @@ struct BodyShape {
   bool render_mesh = false;
   std::vector<float> element_sizes;  ///< s, of the cubature: cube roots of weights, the largest 1
   std::vector<ShownExample> examples;
-  Bounds bounds;          ///< at rest
-  bool on_bones = false;  ///< it hangs on a skeleton
-  double mass = 0;        ///< mass of a free body [kg]; 0 with fixed vertices
+  Bounds bounds;                           ///< at rest
+  std::vector<std::string> bones;          ///< names, of a body on a skeleton
+  std::vector<std::int64_t> bone_parents;  ///< one for each bone, -1 of a root
+  double mass = 0;                         ///< mass of a free body [kg]; 0 with fixed vertices
+
+  bool on_bones() const { return !bones.empty(); }
 };
 
 /// Shape of a model's bodies, from its surface.

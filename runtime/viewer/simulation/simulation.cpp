@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <map>
 
 namespace exmat::viewer {
 namespace {
 
-constexpr double kObstacleDelay = 0.06;  // [s] of an obstacle that is moved by hand
-constexpr double kArrived = 1e-9;        // of the distance that it has to go [m]
+constexpr double kDelay = 0.06;    // [s] of an obstacle or a joint that is moved by hand
+constexpr double kArrived = 1e-9;  // of the distance that it has to go [m]
 
 constexpr std::size_t kMostMeasured = 6000;  // vertices of a body whose load capacity is found while it moves
 constexpr std::size_t kMostTouched = 4;      // bodies whose contacts are
@@ -123,6 +124,7 @@ void Simulation::take(Made made) {
   kinds_ = std::move(made.kinds);
   slots_ = std::move(made.slots);
   bodies_ = std::move(made.bodies);
+  moved_bones_ = false;
   if (!is_world()) place_side_by_side();
   World& world = bodies_.world();
   world.set_profiled(true);
@@ -209,6 +211,7 @@ void Simulation::rebuild(std::size_t kind, const Settings& settings) {
     stood.emplace_back(bodies_.world().obstacle(obstacle.id), bodies_.world().obstacle_motion(obstacle.id));
   const bool goes_on = std::ranges::none_of(documents, &SceneDocument::has_scripted_motion);
   grips_.clear();
+  joint_hands_.clear();
   documents_ = std::move(documents);
   take(std::move(made));
   steps_ = 0;
@@ -219,7 +222,7 @@ void Simulation::rebuild(std::size_t kind, const Settings& settings) {
     obstacles_[i].moved = true;
   }
   for (std::size_t i = 0; goes_on && i < bodies_.size(); ++i) {
-    if (kinds_[slots_[i].kind].shape->on_bones) continue;
+    if (kinds_[slots_[i].kind].shape->on_bones()) continue;
     bodies_[i].set_reduced(motions[i].q, motions[i].v);
     if (kinds_[slots_[i].kind].shape->mass > 0) bodies_[i].set_motion(motions[i].motion);
   }
@@ -227,8 +230,10 @@ void Simulation::rebuild(std::size_t kind, const Settings& settings) {
 }
 
 void Simulation::reset() {
+  if (moved_bones_) rebuild(0, kinds_.front().settings);  // bones that a host gives end an animation
   bodies_.world().reset();
   grips_.clear();
+  joint_hands_.clear();
   steps_ = 0;
   failure_.clear();
 }
@@ -236,12 +241,13 @@ void Simulation::reset() {
 // ---- steps ----------------------------------------------------------------------------------------------------------
 
 bool Simulation::is_held() const {
-  return !grips_.empty() ||
+  return !grips_.empty() || !joint_hands_.empty() ||
          std::ranges::any_of(obstacles_, [](const MovedObstacle& moved) { return moved.target.has_value(); });
 }
 
 void Simulation::prepare_step() {
   move_obstacles();
+  move_bones();
   for (const Grip& grip : grips_) bodies_[grip.body()].clear_forces();
   for (Grip& grip : grips_) grip.pull(time_step(), strength_, bodies_[grip.body()]);
 }
@@ -251,12 +257,22 @@ void Simulation::move_obstacles() {
     if (!moved.target) continue;
     const exmat_motion now = bodies_.world().obstacle_motion(moved.id);
     const Eigen::Vector3d from(now.position);
-    const Eigen::Vector3d way = (1 - std::exp(-time_step() / kObstacleDelay)) * (*moved.target - from);
+    const Eigen::Vector3d way = (1 - std::exp(-time_step() / kDelay)) * (*moved.target - from);
     const bool arrived = way.norm() < kArrived;
     bodies_.world().move_obstacle(
         moved.id, motion_at(from, now, arrived ? Eigen::Vector3d::Zero() : Eigen::Vector3d(way / time_step())));
     if (arrived) moved.target.reset();
   }
+}
+
+void Simulation::move_bones() {
+  std::map<std::size_t, std::vector<double>> moved;  // transforms of the bones of a body
+  for (const JointHand& hand : joint_hands_) {
+    const std::vector<std::int64_t>& parents = kinds_[slots_[hand.body].kind].shape->bone_parents;
+    auto& transforms = moved.try_emplace(hand.body, bodies_[hand.body].bones(parents.size())).first->second;
+    turn_toward(hand.joint, hand.target, 1 - std::exp(-time_step() / kDelay), parents, transforms);
+  }
+  for (const auto& [body, transforms] : moved) bodies_[body].set_bones(transforms);
 }
 
 bool Simulation::step(std::int64_t steps) {
@@ -305,12 +321,24 @@ int Simulation::grab(std::size_t body, const SurfaceHit& place) {
   return next_grip_++;
 }
 
+int Simulation::grab_joint(std::size_t body, std::size_t joint) {
+  const std::vector<double> transforms = bodies_[body].bones(kinds_[slots_[body].kind].shape->bones.size());
+  bodies_[body].set_bones(transforms);  // the first bones that a host gives put the body there
+  moved_bones_ = true;
+  const double* const place = transforms.data() + 12 * joint;
+  joint_hands_.push_back({next_grip_, body, joint, {place[3], place[7], place[11]}});
+  return next_grip_++;
+}
+
 void Simulation::move_grip(int id, const Eigen::Vector3d& target) {
   for (Grip& grip : grips_)
     if (grip.id() == id) grip.set_target(target);
+  for (JointHand& hand : joint_hands_)
+    if (hand.id == id) hand.target = target;
 }
 
 void Simulation::release(int id) {
+  std::erase_if(joint_hands_, [&](const JointHand& hand) { return hand.id == id; });
   const auto grip = std::ranges::find(grips_, id, &Grip::id);
   if (grip == grips_.end()) return;
   const std::size_t body = grip->body();

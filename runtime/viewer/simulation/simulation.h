@@ -10,6 +10,7 @@
 #include "exmat/exmat.hpp"
 #include "runtime/viewer/scene/scene_document.h"
 #include "runtime/viewer/simulation/grip.h"
+#include "runtime/viewer/simulation/joint_hand.h"
 #include "runtime/viewer/simulation/snapshot.h"
 #include "runtime/viewer/simulation/stepped_bodies.h"
 
@@ -39,7 +40,8 @@ class Simulation {
   /// nothing has changed.
   void apply(std::size_t kind, const Settings& settings);
 
-  /// All back to the start; obstacles of the scene, too.
+  /// All back to the start; obstacles of the scene, too. Throws exmat::Error, and nothing has changed, where hands have
+  /// moved bones and the bundle cannot be read again.
   void reset();
 
   /// So many steps; fewer where a number is not finite, see failure().
@@ -52,6 +54,8 @@ class Simulation {
 
   // Hands. Places in the world are without the body's offset.
   int grab(std::size_t body, const SurfaceHit& place);
+  /// Takes hold of a joint of a body on bones; from then on until reset() no animation moves them.
+  int grab_joint(std::size_t body, std::size_t joint);
   void move_grip(int id, const Eigen::Vector3d& target);
   void release(int id);
   void set_strength(double strength) { strength_ = strength; }
@@ -116,6 +120,7 @@ class Simulation {
   bool is_held() const;
   void prepare_step();
   void move_obstacles();
+  void move_bones();
   bool step(std::int64_t steps);
   void add_times(std::int64_t steps, double seconds);
   void put(const Settings& settings, const Kind& kind, std::vector<SceneDocument>& documents) const;
@@ -130,6 +135,8 @@ class Simulation {
   SteppedBodies bodies_;
   std::vector<MovedObstacle> obstacles_;
   std::vector<Grip> grips_;
+  std::vector<JointHand> joint_hands_;
+  bool moved_bones_ = false;  ///< true once a hand has held a joint of this world
   int next_grip_ = 1;
   double strength_ = 1;
   std::int64_t steps_ = 0;

@@ -58,6 +58,7 @@ BodySnapshot Simulation::body_snapshot(std::size_t index, const SnapshotRequest&
   std::ranges::transform(placement, snapshot.placement.begin(),
                          [](double number) { return static_cast<float>(number); });
   if (body.space() == EXMAT_SPACE_FULL) snapshot.positions = positions(index);
+  if (kind.shape->on_bones()) snapshot.bones = body.bones(kind.shape->bones.size());
   snapshot.energies = body.energies();
   snapshot.motion = body.motion();
   if (request.colouring == Colouring::kStrainEnergy) {
@@ -99,6 +100,11 @@ Snapshot Simulation::snapshot(const SnapshotRequest& request) {
   for (const Grip& grip : grips_) {
     const Eigen::Vector3d& offset = slots_[grip.body()].offset;
     snapshot.grips.push_back({grip.id(), grip.body(), grip.point() + offset, grip.target() + offset, grip.force()});
+  }
+  for (const JointHand& hand : joint_hands_) {
+    const Eigen::Vector3d& offset = slots_[hand.body].offset;
+    snapshot.grips.push_back({hand.id, hand.body, snapshot.bodies[hand.body].joint(hand.joint) + offset,
+                              hand.target + offset, Eigen::Vector3d::Zero()});
   }
   for (const MovedObstacle& moved : obstacles_)
     snapshot.obstacles.push_back(

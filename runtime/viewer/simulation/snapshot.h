@@ -32,17 +32,23 @@ struct BodySnapshot {
   std::vector<float> elements;               ///< 3s, world [m]; where asked for
   std::vector<std::vector<double>> weights;  ///< one list for each example force
   std::vector<std::vector<float>> targets;   ///< likewise, r; where asked for
+  std::vector<double> bones;                 ///< 12b, transforms of bones, world, without the offset [1], [m]
   std::vector<exmat_contact> contacts;       ///< also with other bodies: of obstacle -1
   exmat_energies energies{};
   exmat_motion motion{};
+
+  Eigen::Vector3d joint(std::size_t bone) const {
+    const double* const place = bones.data() + 12 * bone;
+    return {place[3], place[7], place[11]};
+  }
 };
 
-/// A grip as it is drawn: in the world, with the body's offset.
+/// A grip or a hand on a joint as it is drawn: in the world, with the body's offset.
 struct GripSnapshot {
   int id = 0;
   std::size_t body = 0;
   Eigen::Vector3d point = Eigen::Vector3d::Zero(), target = Eigen::Vector3d::Zero();  ///< [m]
-  Eigen::Vector3d force = Eigen::Vector3d::Zero();                                    ///< on the body [N]
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< on the body [N]; 0 of a hand on a joint
 };
 
 struct ObstacleSnapshot {

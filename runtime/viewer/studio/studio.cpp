@@ -13,6 +13,7 @@ namespace {
 constexpr double kMessageSeconds = 6;
 constexpr double kBetweenMeasurements = 0.12;  // [s] of lost work
 constexpr double kPanels = 570;                // pixels that they take of the width
+constexpr double kJointReach = 9;              // pixels from a joint
 
 Eigen::Vector3d up_of(const Settings& settings) {
   const Eigen::Vector3d gravity(settings.gravity.data());
@@ -49,14 +50,35 @@ void Studio::apply(std::size_t kind, const Settings& settings) {
 }
 
 void Studio::reset() {
-  runner_.with([](Simulation& simulation) { simulation.reset(); });
-  drag_.reset();
+  try {
+    runner_.with([](Simulation& simulation) { simulation.reset(); });
+    drag_.reset();
+  } catch (const std::exception& error) {
+    say(error.what());
+  }
+}
+
+std::optional<Pick> Studio::pick_joint(const Snapshot& snapshot, const Eigen::Vector2d& pixel,
+                                       const PictureSize& picture) const {
+  std::optional<Pick> nearest;
+  double distance = kJointReach;
+  for (std::size_t body = 0; body < snapshot.bodies.size(); ++body)
+    for (std::size_t joint = 0; joint < shapes_[kinds_[body]]->bones.size(); ++joint) {
+      const Eigen::Vector3d point = snapshot.bodies[body].joint(joint) + offsets_[body];
+      const std::optional<Eigen::Vector2d> shown = camera_.pixel(point, picture);
+      if (!shown || (*shown - pixel).norm() >= distance) continue;
+      distance = (*shown - pixel).norm();
+      nearest = Pick{Pick::What::kJoint, body, joint, {}, point};
+    }
+  return nearest;
 }
 
 std::optional<Pick> Studio::pick(const Eigen::Vector2d& pixel, const PictureSize& picture) {
   const Ray ray = camera_.ray(pixel, picture);
   return runner_.with([&](Simulation& simulation) {
-    std::optional<Pick> nearest;
+    const Snapshot snapshot = simulation.snapshot({});
+    std::optional<Pick> nearest = look_.bones ? pick_joint(snapshot, pixel, picture) : std::nullopt;
+    if (nearest) return nearest;
     double distance = 1e300;
     for (std::size_t body = 0; body < simulation.bodies(); ++body) {
       const Ray own{ray.origin - offsets_[body], ray.direction};
@@ -64,15 +86,14 @@ std::optional<Pick> Studio::pick(const Eigen::Vector2d& pixel, const PictureSize
           first_hit(own, simulation.positions(body), shapes_[kinds_[body]]->triangles);
       if (!hit || hit->distance >= distance) continue;
       distance = hit->distance;
-      nearest = Pick{Pick::What::kBody, body, *hit, ray.at(distance)};
+      nearest = Pick{Pick::What::kBody, body, 0, *hit, ray.at(distance)};
     }
-    const Snapshot snapshot = simulation.snapshot({});
     for (std::size_t i = 0; i < snapshot.obstacles.size(); ++i) {
       const ObstacleSnapshot& obstacle = snapshot.obstacles[i];
       const auto hit = obstacle_hit(ray, obstacle.obstacle, *obstacle.corners, obstacle.motion);
       if (!hit || *hit >= distance) continue;
       distance = *hit;
-      nearest = Pick{Pick::What::kObstacle, i, {}, ray.at(distance)};
+      nearest = Pick{Pick::What::kObstacle, i, 0, {}, ray.at(distance)};
     }
     return nearest;
   });
@@ -85,6 +106,8 @@ bool Studio::begin_drag(const Eigen::Vector2d& pixel, const PictureSize& picture
   runner_.with([&](Simulation& simulation) {
     if (found->what == Pick::What::kBody)
       drag.grip = simulation.grab(found->number, found->place);
+    else if (found->what == Pick::What::kJoint)
+      drag.grip = simulation.grab_joint(found->number, found->joint);
     else
       drag.from = position_of(simulation.snapshot({}).obstacles[found->number].motion);
   });
@@ -96,7 +119,7 @@ void Studio::drag(const Eigen::Vector2d& pixel, const PictureSize& picture) {
   if (!drag_) return;
   const Eigen::Vector3d to = camera_.on_plane_of(drag_->anchor, pixel, picture);
   runner_.with([&](Simulation& simulation) {
-    if (drag_->pick.what == Pick::What::kBody)
+    if (drag_->pick.what != Pick::What::kObstacle)
       simulation.move_grip(drag_->grip, to - offsets_[drag_->pick.number]);
     else
       simulation.move_obstacle(drag_->pick.number, drag_->from + to - drag_->anchor);
@@ -105,7 +128,7 @@ void Studio::drag(const Eigen::Vector2d& pixel, const PictureSize& picture) {
 
 void Studio::end_drag() {
   if (!drag_) return;
-  if (drag_->pick.what == Pick::What::kBody)
+  if (drag_->pick.what != Pick::What::kObstacle)
     runner_.with([&](Simulation& simulation) { simulation.release(drag_->grip); });
   drag_.reset();
 }

@@ -13,8 +13,9 @@ namespace exmat::viewer {
 
 /// The thing that the mouse is on.
 struct Pick {
-  enum class What { kBody, kObstacle } what = What::kBody;
+  enum class What { kBody, kJoint, kObstacle } what = What::kBody;
   std::size_t number = 0;                           ///< number of the body or the obstacle
+  std::size_t joint = 0;                            ///< joint of a body
   SurfaceHit place;                                 ///< place on a body
   Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< in the picture [m]
 };
@@ -43,6 +44,7 @@ class Studio {
   void reset();
   void toggle_pause() { runner_.set_paused(!runner_.paused()); }
 
+  /// Joints lie before all else where bones are shown.
   std::optional<Pick> pick(const Eigen::Vector2d& pixel, const PictureSize& picture);
 
   // With the mouse, one thing at a time.
@@ -76,6 +78,9 @@ class Studio {
   bool end = false;        ///< the window is to be closed
 
  private:
+  std::optional<Pick> pick_joint(const Snapshot& snapshot, const Eigen::Vector2d& pixel,
+                                 const PictureSize& picture) const;
+
   struct Drag {
     Pick pick;
     int grip = 0;

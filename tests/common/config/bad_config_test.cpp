@@ -89,6 +89,8 @@ const BadConfig kBadAssets[] = {
      "a.json: /object: expected mesh (tets) or surface (triangles), found both"},
     {"CellsOfTets", object(R"("cells": 500)"),
      "a.json: /object/cells: expected none beside object.mesh, which has its tets, found one"},
+    {"SkeletonOfASurface", R"({"name": "a", "object": {"surface": "s.glb", "skeleton": "bones.json"}})",
+     "a.json: /object/skeleton: expected none beside object.surface, whose glTF file has its bones, found one"},
     {"CellsAndCellSize", R"({"name": "a", "object": {"surface": "s.glb", "cells": 500, "cell_size": 0.1}})",
      "a.json: /object: expected cells or cell_size, found both"},
     {"NoShapeOfExample", examples(R"({"name": "b"})"),

@@ -27,7 +27,8 @@ TEST(LoadAsset, FillsInDefaults) {
   EXPECT_EQ(asset.object_mesh, folder / "bar.veg");
   EXPECT_EQ(asset.material.model, MaterialModel::kStVenantKirchhoff);
   EXPECT_FALSE(asset.material.density || asset.fixed || asset.cubature_elements || asset.cubature_tolerance ||
-               asset.needs || asset.render_mesh || asset.contact_vertices || asset.contact_count);
+               asset.needs || asset.object_skeleton || asset.render_mesh || asset.contact_vertices ||
+               asset.contact_count);
   EXPECT_TRUE(asset.examples.empty());
   EXPECT_EQ(asset.eigenfunctions, 20);
   EXPECT_FALSE(asset.pose_tolerance);
@@ -58,7 +59,8 @@ TEST(LoadAsset, ReadsEveryMember) {
     "object": {"mesh": "/data/car.veg", "drop": ["degenerate_tets", "smaller_components"],
                "material": {"model": "stvk", "youngs_modulus": 6.0e6, "poisson_ratio": 0.4, "density": 1000},
                "fixed": {"box": {"min": [0, -1, 0], "max": [1, 1, 0.01]}},
-               "materials": [{"tets": {"set": "wheel 1"}, "density": 7}], "render_mesh": "draw/car.obj"},
+               "materials": [{"tets": {"set": "wheel 1"}, "density": 7}], "render_mesh": "draw/car.obj",
+               "skeleton": "draw/bones.json"},
     "shape_space": {"eigenfunctions": 6, "tolerance": 0.05, "weighting": "none"},
     "examples": [{"name": "rest", "mesh": "../ex0.veg", "rest": true},
                  {"name": "bend", "mesh": "sub/./ex1.veg", "drop": ["unreferenced_vertices"]}],
@@ -84,6 +86,7 @@ TEST(LoadAsset, ReadsEveryMember) {
   EXPECT_THAT(box.max, ElementsAre(1, 1, 0.01));
   EXPECT_EQ(std::get<SetSelection>(asset.material_regions.at(0).tets).name, "wheel 1");
   EXPECT_EQ(asset.render_mesh, folder / "draw/car.obj");
+  EXPECT_EQ(asset.object_skeleton, folder / "draw/bones.json");
   EXPECT_EQ(asset.eigenfunctions, 6);
   EXPECT_EQ(asset.pose_tolerance, 0.05);
   EXPECT_EQ(asset.weighting, Weighting::kNone);

@@ -15,7 +15,7 @@ import exmat
 
 TESTS = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(TESTS / "integration"))
-from programs import write_skinned  # noqa: E402
+from programs import bar, write_json, write_skinned  # noqa: E402
 
 BUILD = pathlib.Path(os.environ.get("EXMAT_BUILD", TESTS.parent / "build/release"))
 LENGTH = 3.0
@@ -239,3 +239,28 @@ def test_flesh_does_not_go_through_flesh(skinned, held):
         shares = np.einsum("tij,tkj->tki", inverse, xyz[tip] - corners[:, :1])
         deep.append(int((np.minimum(shares.min(2), 1 - shares.sum(2)).max(0) > 0.05).sum()))
     assert deep[0] > 5 and deep[1] == 0
+
+
+def test_tets_hang_on_the_bones_of_a_file(folder, monkeypatch):
+    monkeypatch.chdir(folder)
+    mesh, clamp = bar()
+    lower = list(range(4 * len(clamp)))  # the half before x = 2
+    pathlib.Path("bar.veg").write_text(mesh)
+    write_json("bones.json", {
+        "joints": [{"name": "lower", "position": [0, 0.5, 0.5]}, {"name": "upper", "parent": "lower", "position": [2, 0.5, 0.5]}],
+        "weights": [{"joint": "lower", "vertices": lower}, {"joint": "upper", "vertices": list(range(len(lower), 9 * len(clamp)))}]})
+    path = bundle_of(folder / "bar.veg", None, object={
+        "mesh": "bar.veg", "skeleton": "bones.json", "material": {"youngs_modulus": 3e5, "poisson_ratio": 0.4, "density": 1000}})
+    model = exmat.Model(path, **SETTINGS)
+    assert model.bones == {"lower": None, "upper": "lower"}
+    body = exmat.Body(model)
+    bones = model.bound_bones
+    bones[1, :, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+    for _ in range(5):
+        body.set_bones(bones)
+        body.step()
+    with h5py.File(path) as file:
+        fixed = np.flatnonzero(file["/object/fixed"][:])
+        held = fixed, file["/object/vertices"][:][fixed], (fixed >= len(lower)).astype(int)
+    assert set(held[2]) == {0, 1}
+    assert off_bones(body, bones, held) < 1e-12 * 4

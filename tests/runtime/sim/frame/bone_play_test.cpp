@@ -50,7 +50,8 @@ TEST(BonePlay, TurnsBonesInTheirOwnAxesAndWhatHangsOnThem) {
   const RigidMotion hip({{0, {0, 0, 0}}, {1, {0.05, 0, 0}, about(-0.5, {1, 0, 0})}});
   for (const bool is_animated : {false, true}) {
     BonePlay play{.animation = is_animated ? &animation : nullptr, .loop = false, .bound = skeleton.bound()};
-    play.keys = {{skeleton.branch(1), skeleton.axes(1), thigh}, {skeleton.branch(0), skeleton.axes(0), hip}};
+    play.add_keys(skeleton, 0, hip);
+    play.add_keys(skeleton, 1, thigh);
     for (const double time : {0.0, 0.4, 1.0, 3.0}) {
       BonePoses base = skeleton.bound(), poses = base;
       if (is_animated) animation.sample(time, base);
