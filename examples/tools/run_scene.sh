@@ -18,7 +18,7 @@ member() { sed -n "s/.*\"$1\": *\"\([^\"]*\)\".*/\1/p" "$source"; }
 mkdir -p "$output"
 cp "$source" "$output/scene$variant.json"
 if grep -q '"bodies"' "$source"; then
-  for bundle in $(member bundle); do
+  for bundle in $(member bundle | sort -u); do
     "$programs/exmat-precompute" bundle "$folder/asset_${bundle%.h5}.json" -o "$output/$bundle"
   done
   for poses in $(member poses); do cp "$folder/$poses" "$output"; done
