@@ -105,9 +105,6 @@ WorldStudy::WorldStudy(const StudyConfig& config, const StudyOptions& options)
 }
 
 void WorldStudy::require_measurable() const {
-  if (world_.contact.self)
-    refuse(world_.file, "/contact/self", "false: the full space of bodies that touch themselves is not there", "true",
-           "measure the scene without");
   for (const BodiesConfig& bodies : world_.bodies) {
     if (const std::string keys = place_of_keys(bodies.scene); !keys.empty())
       refuse(world_.file, keys, "a value: studies take no keys", "keys",
