@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 #include <numbers>
 #include <set>
+#include <string>
 #include <vector>
 
 #include "common/config/config.h"
@@ -53,6 +54,19 @@ class TetBones : public testing::Test {
     return asset_of({{"name", "bar"}, {"object", object}}, folder_.path("asset.json"));
   }
   ObjectInput read(const Json& members = Json::object()) { return read_object(asset(members), files_); }
+
+  // Weights of the two bones [v x 2] on an .obj surface.
+  RowMatrix weights_of_render_mesh(const std::string& surface) {
+    folder_.write("skin.obj", surface);
+    const AssetConfig config = asset({{"render_mesh", "skin.obj"}});
+    std::vector<std::string> warnings;
+    const RenderData render = read_render_mesh(config, read_object(config, files_), files_, warnings);
+    RowMatrix weights = RowMatrix::Zero(render.vertices.rows(), 2);
+    for (Eigen::Index v = 0; v < weights.rows(); ++v)
+      for (Eigen::Index k = 0; k < render.bones.cols(); ++k)
+        weights(v, render.bones(v, k)) += render.bone_weights(v, k);
+    return weights;
+  }
 
   // Distance from the line through the middle of the bar [m].
   double off_middle(Eigen::Index v) const { return (mesh_.vertices.row(v).tail(2).array() - 0.5).matrix().norm(); }
@@ -175,14 +189,15 @@ TEST_F(TetBones, MoveAsTheirAnimationsSay) {
 }
 
 TEST_F(TetBones, HoldARenderMeshByTheWeightsOfItsTets) {
-  folder_.write("skin.obj", "v 1 0.5 0.5\nv 2 0.5 0.5\nv 2.25 0 0\nf 1 2 3\n");
-  const AssetConfig config = asset({{"render_mesh", "skin.obj"}});
-  std::vector<std::string> warnings;
-  const RenderData render = read_render_mesh(config, read_object(config, files_), files_, warnings);
-  RowMatrix weights = RowMatrix::Zero(3, 2);
-  for (Eigen::Index v = 0; v < 3; ++v)
-    for (Eigen::Index k = 0; k < render.bones.cols(); ++k) weights(v, render.bones(v, k)) += render.bone_weights(v, k);
+  const RowMatrix weights = weights_of_render_mesh("v 1 0.5 0.5\nv 2 0.5 0.5\nv 2.25 0 0\nf 1 2 3\n");
   EXPECT_LE((weights - (RowMatrix(3, 2) << 1, 0, 0.75, 0.25, 0.375, 0.625).finished()).norm(), 1e-12);
+}
+
+// The last tets, from 3.5 m to 4 m, go from one bone to the other: their affine weights are -0.5 and 1.5 at 4.25 m.
+TEST_F(TetBones, HoldARenderMeshOutsideOfItsTetsByWeightsFrom0To1) {
+  bones_["weights"] = {list("lower", 0, 7, 1), list("upper", 8, 8, 1)};
+  const RowMatrix weights = weights_of_render_mesh("v 4.25 0.5 0.5\nv 3.75 0.5 0.5\nv 3.75 0 0\nf 1 2 3\n");
+  EXPECT_LE((weights - (RowMatrix(3, 2) << 0, 1, 0.5, 0.5, 0.5, 0.5).finished()).norm(), 1e-12);
 }
 
 TEST_F(TetBones, AreAnInputOfTheBundle) {
