@@ -195,7 +195,7 @@ void visit_attachments(Archive& archive, Body& body) {
     if (!archive.checks() && (!fits || before != count)) body.world->world.fit_attachments(place_of(body));
 }
 
-/// Forces of the host with an id, and the sum of the others, where there are some.
+/// The host's forces by id, and the sum of those without one; nothing where no force has an id.
 template <typename Archive, typename Body>
 void visit_forces(Archive& archive, Body& body) {
   archive.whole("forces", body.next_forces, kMostSteps);
