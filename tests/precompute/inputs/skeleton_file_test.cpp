@@ -104,7 +104,7 @@ TEST_F(TetBones, MayHaveSeveralRoots) {
 }
 
 // Cells are a sixth of a metre across: a vertex beside the middle is 1/6 m from the axis and 1/3 m from the surface.
-// Of the planes at the ends, the first has the joint in its middle, and the last is beyond the axis.
+// The plane at one end has the joint in its middle, that at the other end is beyond the axis.
 TEST_F(TetBones, HoldTheVerticesAboutTheirAxes) {
   const ObjectInput object = read();
   EXPECT_THAT(object.warnings, ElementsAre());
@@ -122,7 +122,7 @@ TEST_F(TetBones, HoldWhatTheAssetFixesInTheirPlace) {
   EXPECT_TRUE(object.skeleton);
 }
 
-// With two cells across, all vertices within lie in the middle.
+// All vertices within a bar of two cells across lie in its middle.
 class ThinTetBones : public TetBones {
  protected:
   ThinTetBones() : TetBones(2) {}
@@ -164,8 +164,8 @@ TEST_F(TetBones, CountVerticesAsTheMeshFileDoes) {
     ASSERT_EQ(object.skeleton->weights(v, 0) > 0, object.mesh.vertices(v, 0) < 2.1) << v;
 }
 
-// At 0.5 s the lower joint has moved by 0.1 m along z, with what hangs on it, and the upper one turned by 60 degrees
-// about its own z, which is the world's x.
+// The lower joint has moved by 0.1 m along z at 0.5 s, with what hangs on it, and the upper one has turned by 60
+// degrees about its own z, which is the world's x.
 TEST_F(TetBones, MoveAsTheirAnimationsSay) {
   const double half = std::numbers::pi / 6;
   bones_["animations"] = Json::parse(R"([ { "name": "twist", "bones": [
