@@ -422,7 +422,7 @@ void set_world(std::span<const double> numbers, exmat_world& world) {
   visit_motion(reader, world);
   for (const auto& member : world.members) {
     member.body->state.begins_anew |= holds_modes(member.body->state.attachments);  // whose past it does not hold
-    member.body->forces.clear();                                                    // of which the state has the sum
+    member.body->forces.clear();                                                    // the state has their sum
   }
   world.world.take_states();
   world.contacts.clear();
