@@ -65,8 +65,11 @@ RowMatrix spread_weights(const TetMesh& mesh, const Eigen::SparseMatrix<double>&
         "the weights of bones cannot be spread over the tets: parts of the mesh are connected to no vertex that has "
         "weights");
   RowMatrix weights = factor.solve(Eigen::MatrixXd(at.transpose() * (hold.asDiagonal() * given)));
-  weights = (weights.array() < kLeastWeight).select(0, weights);
-  for (auto row : weights.rowwise()) row /= row.sum();
+  for (auto row : weights.rowwise()) {
+    const double least = row.maxCoeff() < kLeastWeight ? 0 : kLeastWeight;  // each of very many bones may have less
+    row = (row.array() < least).select(0, row).eval();
+    row /= row.sum();
+  }
   return weights;
 }
 

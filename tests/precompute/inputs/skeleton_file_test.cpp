@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <numbers>
@@ -149,6 +150,19 @@ TEST_F(TetBones, FillTheWeightsBetweenThoseThatAreGiven) {
     ASSERT_NEAR(skeleton.weights(v, 1), upper, given ? 0 : 1e-3) << v;
     ASSERT_NEAR(skeleton.weights.row(v).sum(), 1, 1e-12) << v;
   }
+}
+
+// The weights are below the one that is left out, and the same everywhere.
+TEST_F(TetBones, MayBeVeryManyAtEachVertex) {
+  constexpr int kBones = 200;
+  bones_ = {{"joints", Json::array()}, {"weights", Json::array()}};
+  for (int i = 0; i < kBones; ++i) {
+    const std::string name = fmt::format("bone {}", i);
+    bones_["joints"].push_back({{"name", name}, {"position", {0.01 * i, 0.5, 0.5}}});
+    bones_["weights"].push_back({{"joint", name}, {"vertices", {7}}});
+  }
+  const RowMatrix weights = read({{"fixed", {{"ids", {7}}}}}).skeleton->weights;
+  EXPECT_LE((weights.array() - 1.0 / kBones).abs().maxCoeff(), 1e-9);
 }
 
 TEST_F(TetBones, CountVerticesAsTheMeshFileDoes) {
