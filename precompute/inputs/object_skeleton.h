@@ -11,7 +11,7 @@ namespace exmat::precompute {
 
 /// The skeleton of the object's surface for the cage about it: weights of its bones at the vertices [n x b], rows of
 /// sum 1. They minimise the Dirichlet energy of each bone's field where the surface holds it, as heat would spread
-/// (Baran and Popovic 2007). Weights below kLeastWeight are left out.
+/// (Baran and Popovic 2007). Weights below kLeastWeight are left out, unless all of a vertex are.
 SkeletonData skeleton_of_cage(const ObjectSurface& surface);
 inline constexpr double kLeastWeight = 0.01;
 
