@@ -126,7 +126,7 @@ struct AssetConfig {
   std::string name;
   std::filesystem::path object_mesh;  ///< tets, or, where object_surface is there, that
   std::optional<std::filesystem::path> object_surface;
-  std::optional<std::filesystem::path> object_skeleton;  ///< bones of tets
+  std::optional<std::filesystem::path> object_skeleton;  ///< JSON file of the bones of tets
   std::optional<int> cells;                              ///< number of enclosing tets, about; both absent: the default
   std::optional<double> cell_size;                       ///< [m]
   MaterialConfig material;

@@ -216,7 +216,7 @@ struct FidelityData {
   std::string basis;               ///< "trained", "modal": which of the two was better and is taken
   std::string advice;              ///< remedy, the kind of load, what was tried and what was not
   std::int64_t training_runs = 0;  ///< that the basis has learned from
-  std::int64_t heldout_runs = 0;   ///< that these errors are of
+  std::int64_t heldout_runs = 0;   ///< that it has not, under all kinds of loads
   double position_error = 0;       ///< mean
   double shape_error = 0;          ///< mean, without the rigid motion; of a clamped body as the position
   double end_error = 0;            ///< position (a free body: shape) in the last frame of each run

@@ -17,7 +17,7 @@ class MatrixFreeStepper {
   explicit MatrixFreeStepper(const FullSpaceModel& model) : model_(model), targets_(model.examples.size()) {}
 
   /// Takes what acts on the body in the next steps; false, and nothing is set, where it cannot step with that: example
-  /// forces of a filter that is not symmetric, elastic ones of a free body.
+  /// forces of a filter that is not symmetric, obstacles of a model without contact vertices.
   bool set(const FullSpaceScene& scene);
 
   FullSpaceReport step(FullSpaceState& state);

@@ -144,6 +144,15 @@ SkeletonData skeleton_of_tets(const std::filesystem::path& path, const CheckedMe
   return skeleton;
 }
 
+// Weights of the bones [v x b] at points in tets. A point outside of its tet hangs on no bone by less than 0 or more
+// than 1, as its barycentric coordinates would have it.
+RowMatrix weights_in_tets(const BarycentricPoints& points, const ObjectInput& object) {
+  RowMatrix weights = points.interpolation(object.mesh) * object.skeleton->weights;
+  weights = weights.cwiseMax(0);
+  for (auto row : weights.rowwise()) row /= row.sum();
+  return weights;
+}
+
 // Adds how the vertices of a render mesh hang on bones, by weights of each bone [v x b].
 void add_bones(const RowMatrix& weights, RenderData& render) {
   const Eigen::Index most = (weights.array() > 0).rowwise().count().maxCoeff();
@@ -517,7 +526,7 @@ RenderData read_render_mesh(const AssetConfig& asset, const ObjectInput& object,
   render.bones.resize(render.tets.size(), 0);
   render.bone_weights.resize(render.tets.size(), 0);
   if (is_object && object.surface->file().skeleton) add_bones(object.surface->file().skeleton->weights, render);
-  if (asset.object_skeleton) add_bones(embedding.points.interpolation(object.mesh) * object.skeleton->weights, render);
+  if (asset.object_skeleton) add_bones(weights_in_tets(embedding.points, object), render);
   add_look(asset, files, warnings, render);
   return render;
 }

@@ -47,7 +47,8 @@ std::vector<std::vector<Eigen::Vector3d>> axis_ends(const SkeletonData& skeleton
   return ends;
 }
 
-double usual_edge(const TetMesh& mesh) {
+// Estimate of the length of an edge [m].
+double edge_length_estimate(const TetMesh& mesh) {
   return bounding_box_diagonal(mesh.vertices) / std::cbrt(static_cast<double>(mesh.vertex_count()));
 }
 
@@ -55,22 +56,27 @@ double usual_edge(const TetMesh& mesh) {
 // at `given` [k x b], by the area of each [m^2].
 RowMatrix spread_weights(const TetMesh& mesh, const Eigen::SparseMatrix<double>& at, const Eigen::VectorXd& areas,
                          const RowMatrix& given) {
-  const Eigen::VectorXd hold = kHold / usual_edge(mesh) * areas;
+  const Eigen::VectorXd hold = kHold / edge_length_estimate(mesh) * areas;
   const Eigen::SparseMatrix<double> matrix = Eigen::SparseMatrix<double>(laplacian_stiffness(mesh)) +
                                              Eigen::SparseMatrix<double>(at.transpose() * hold.asDiagonal() * at);
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(matrix);
   if (factor.info() != Eigen::Success)
     throw WorkError(
-        "the weights of bones cannot be carried to the cage: parts of it are near no vertex of the surface");
+        "the weights of bones cannot be spread over the tets: parts of the mesh are connected to no vertex that has "
+        "weights");
   RowMatrix weights = factor.solve(Eigen::MatrixXd(at.transpose() * (hold.asDiagonal() * given)));
-  weights = (weights.array() < kLeastWeight).select(0, weights);
-  for (auto row : weights.rowwise()) row /= row.sum();
+  for (auto row : weights.rowwise()) {
+    const double least = row.maxCoeff() < kLeastWeight ? 0 : kLeastWeight;  // each of very many bones may have less
+    row = (row.array() < least).select(0, row).eval();
+    row /= row.sum();
+  }
   return weights;
 }
 
-// A vertex that a bone may hold: the least first.
+// A vertex that a bone may hold. The first in order is held first.
 struct OwnVertex {
-  double depth, to_axis;  // distance from the axis over that and the distance from the surface; distance [m]
+  double depth;    // distance from the axis over the sum of that and the distance from the surface
+  double to_axis;  // distance from the axis [m]
   Eigen::Index vertex;
   auto operator<=>(const OwnVertex&) const = default;
 };
@@ -101,7 +107,7 @@ void fill_weights(const TetMesh& mesh, RowMatrix& weights) {
   if (given.all()) return;
   Eigen::SparseMatrix<double> at(given.size(), given.size());
   at.setIdentity();
-  const double edge = usual_edge(mesh);
+  const double edge = edge_length_estimate(mesh);
   const RowMatrix spread = spread_weights(mesh, at, edge * edge * given, weights);
   for (Eigen::Index v = 0; v < given.size(); ++v)
     if (given[v] == 0) weights.row(v) = spread.row(v);

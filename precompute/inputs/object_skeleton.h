@@ -11,12 +11,13 @@ namespace exmat::precompute {
 
 /// The skeleton of the object's surface for the cage about it: weights of its bones at the vertices [n x b], rows of
 /// sum 1. They minimise the Dirichlet energy of each bone's field where the surface holds it, as heat would spread
-/// (Baran and Popovic 2007). Weights below kLeastWeight are left out.
+/// (Baran and Popovic 2007). Weights below kLeastWeight are left out, unless all of a vertex are.
 SkeletonData skeleton_of_cage(const ObjectSurface& surface);
 inline constexpr double kLeastWeight = 0.01;
 
-/// Fills rows of 0 of the weights [n x b], whose other rows add up to 1, at least one of them: between these the field
-/// of each bone is harmonic, as that of a cage.
+/// Fills the rows of the weights [n x b] that are 0, with fields that are harmonic between the other rows, as those of
+/// a cage. At least one row is not 0; such rows add up to 1, and stay. Throws WorkError where a part of the mesh is not
+/// connected to any of these.
 void fill_weights(const TetMesh& mesh, RowMatrix& weights);
 
 /// 1 for the vertices [n x 3] that bones hold by themselves: those that hang on one bone with at least kOwnWeight and

@@ -17,13 +17,16 @@ class AnimationFrames {
   explicit AnimationFrames(std::size_t bones) : bones_(bones) {}
 
   /// Begins an animation. Returns the times of its frames [s]: 0, the keys, and 60 a second as far as the last key.
-  /// `keys` are from 0 to kLongestAnimation. Throws InputError of that place of the file where there are too many.
+  /// `keys` are from 0 to kLongestAnimation [s]. Throws InputError with that place of the file where the poses of all
+  /// animations are too many.
   std::vector<double> begin(const std::string& name, std::set<double> keys, const std::string& file,
                             const std::string& place);
 
-  /// Adds the next bone of the next frame: its joint, world [m], and its turn from the bind pose.
+  /// Adds the next bone of the next frame: its joint, world [m], and its turn from the bind pose. Frames and their
+  /// bones come in order, as many as begin() has returned times.
   void add(const Eigen::Vector3d& joint, const Eigen::Quaterniond& turn);
 
+  /// Sets names, frames, times and poses of the animations.
   void put_into(SkeletonData& data) const;
 
  private:

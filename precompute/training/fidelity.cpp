@@ -75,7 +75,7 @@ std::string advice(const FidelityInput& input, const FidelityData& fidelity, con
          "loads";
 }
 
-// The kind of load that errors are of, where runs have several.
+// The kind of load whose errors are reported; empty where the runs are not divided by kind.
 std::string worst_text(const std::vector<Chain>& runs, const std::string& kind) {
   if (!kind.empty()) return fmt::format("; worst under {} alone", kind);
   const bool apart = std::ranges::any_of(runs, [](const Chain& chain) { return !chain.front().kind.empty(); });
@@ -97,7 +97,7 @@ std::string text_of(const Range& range) {
   return low == high ? low : fmt::format("{} to {}", low, high);
 }
 
-// Sizes of what runs tried; empty of kinds that they lack.
+// Ranges of the sizes of loads in runs [m/s^2, 1/s^2, 1, 1, N, m/s, s]; empty for kinds that the runs lack.
 struct Sizes {
   Range gravity, stiffness, elasticity, bias, force, speed, duration;
 

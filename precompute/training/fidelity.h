@@ -27,9 +27,10 @@ struct FidelityInput {
 /// kind of load it is largest, what the runs tried and what they did not.
 FidelityData fidelity_of(const FidelityInput& input);
 
-/// In words: kinds and sizes of the loads of these runs, which are of a body that is `free` or not, how long they last
-/// and their damping; and what they lack.
+/// Words for the kinds and sizes of the loads of these runs, how long they last and their damping. Gravity is left out
+/// of a `free` body, which it does not deform.
 std::string tried_text(const std::vector<Chain>& runs, const TrainingRunOptions& options, bool free);
+/// Words for the kinds of loads that these runs lack.
 std::string untried_text(const std::vector<Chain>& runs, bool free);
 
 }  // namespace exmat::precompute

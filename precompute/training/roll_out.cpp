@@ -24,10 +24,11 @@ struct Sums {
   }
 };
 
-// Of the runs of one kind.
+// Sums over the runs of one kind of load.
 struct KindSums {
   Sums positions, shapes, ends, settled;
 
+  // Mean of the squared sizes of the shapes.
   double size() const { return shapes.frames > 0 ? shapes.size / static_cast<double>(shapes.frames) : 0; }
 };
 

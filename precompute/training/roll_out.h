@@ -18,7 +18,7 @@ struct RollOut {
   double shape = 0;               ///< likewise of deformations
   double end = 0;                 ///< likewise in the last frame of each run
   double settled = 0;             ///< likewise over the last tenth of each run
-  std::int64_t worst_vertex = 0;  ///< of the runs of all kinds
+  std::int64_t worst_vertex = 0;  ///< in the runs of all kinds
   double worst_distance = 0;      ///< its distance, of deformations [m]
 };
 

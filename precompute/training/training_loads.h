@@ -82,7 +82,7 @@ struct LoadKind {
   std::string name;
   TrainingLoads loads;
 };
-/// Those that act on a body: gravity unless it is free, example forces, pushes, throws of a free one.
+/// The kinds that act on a body: gravity unless it is free, example forces, pushes, throws of a free one.
 std::vector<LoadKind> kinds_of(const TrainingLoads& loads, bool free);
 
 /// All of it, for hashes.

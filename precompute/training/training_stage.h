@@ -38,8 +38,9 @@ struct TrainingInput {
 
 TrainingBody training_body(const TrainingInput& input);
 
-/// Draws the training's segments and two held-out ones. Of loads that are not a scene's the held-out ones are one of
-/// all loads and one of each kind, if there are several; gravity by itself for 2.4 periods of the lowest mode.
+/// Draws the training's segments and those that are held out: two, of a body that is thrown three. If the loads are not
+/// a scene's and of several kinds, one of all loads and one of each kind by itself are held out; that of gravity lasts
+/// three times as long as the others.
 TrainingChains draw_training(const TrainingInput& input, TrainingLoads loads, const TrainingConfig& config,
                              std::uint64_t seed);
 

@@ -27,7 +27,7 @@ struct GivenForces {
   Eigen::VectorXd load{};                                          ///< [3n] of a body with a capacity
 };
 
-/// Changes nothing but scratch of the body.
+/// Checks a caller's forces and reads them; changes nothing but scratch of the body.
 exmat_status read_forces(const char* function, exmat_body& body, const exmat_points* points, const double* forces,
                          std::int64_t coordinates, GivenForces& given) noexcept {
   if (points == nullptr) return null_argument(function, "points");
@@ -68,7 +68,7 @@ void add_vertex_forces(const PointSet& points, const double* forces, const FullS
         sum.segment<3>(3 * number) += points.shares(i, c) * Eigen::Map<const Eigen::Vector3d>(forces + 3 * i);
 }
 
-/// Adds them to these sums, or, where `to` is null, to those of the state.
+/// Adds forces to the sums `to`, or, where that is null, to those of the state.
 void add_forces(const GivenForces& given, exmat_body& body, AppliedForces* to) noexcept {
   State& state = body.state;
   (to != nullptr ? to->modes : state.applied_force) += body.force;
@@ -103,7 +103,7 @@ AppliedForces applied_sums(const exmat_body& body) {
   return sums;
 }
 
-/// Makes the sums of the state of all forces again.
+/// Sets the sums of the state from all forces of a body that keeps them.
 void sum_forces(exmat_body& body) noexcept {
   clear_applied(body);
   for (const AppliedForces& forces : body.forces) {
@@ -114,7 +114,7 @@ void sum_forces(exmat_body& body) noexcept {
   }
 }
 
-/// End of the list where there is none, which is the error then.
+/// Forces of this id; where there are none the end of the list, after fail().
 auto find_forces(const char* function, exmat_body& body, std::int64_t id) noexcept {
   const auto found = id >= 0 ? std::ranges::find(body.forces, id, &AppliedForces::id) : body.forces.end();
   if (found == body.forces.end())

@@ -161,7 +161,7 @@ exmat_status exmat_body_set_state(exmat_body* body, const double* numbers, std::
     const double time = body->state.time;
     StateReader reader(given, StateReader::Use::kTake);
     visit_state(reader, *body);
-    body->forces.clear();  // of which the state has the sum
+    body->forces.clear();  // the state has their sum
     State& state = body->state;
     state.begins_anew |= holds_modes(state.attachments);                             // whose past it does not hold
     const bool anew = state.contacts.first_step || body->world->members.size() > 1;  // others' contacts are forgotten

@@ -1,5 +1,6 @@
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cinttypes>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -18,14 +19,15 @@ struct Ray {
   Eigen::Vector3d origin, direction;  ///< [m], unit
 };
 
-/// What a ray meets first.
+/// The first triangle that a ray meets; -1: none.
 struct Hit {
   Eigen::Index triangle = -1;
   Eigen::Vector3d shares = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::Zero();
   double distance = 0;  ///< [m]
 };
 
-/// Moeller and Trumbore 1997.
+/// Casts a ray through triangles whose corners are at `xyz` [3k], world [m], no farther than `most` [m]. Moeller and
+/// Trumbore 1997.
 Hit first_hit(const TriangleArray& triangles, const std::vector<double>& xyz, const Ray& ray, double most) {
   const auto corner = [&](Eigen::Index triangle, int c) {
     return Eigen::Map<const Eigen::Vector3d>(xyz.data() + 3 * static_cast<Eigen::Index>(triangles(triangle, c)));

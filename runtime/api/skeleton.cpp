@@ -36,8 +36,7 @@ void write_matrices(const Skeleton& skeleton, const BonePoses& poses, double* tr
 
 exmat_status no_skeleton(const char* function) noexcept {
   return fail(EXMAT_INVALID_ARGUMENT,
-              "%s: the model has no bones: make its bundle of a surface with a skin, or of "
-              "tets with object.skeleton",
+              "%s: the model has no bones: make its bundle of a surface with a skin, or of tets with object.skeleton",
               function);
 }
 

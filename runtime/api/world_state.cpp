@@ -195,7 +195,7 @@ void visit_attachments(Archive& archive, Body& body) {
     if (!archive.checks() && (!fits || before != count)) body.world->world.fit_attachments(place_of(body));
 }
 
-/// Forces of the host with an id, and the sum of the others, where there are some.
+/// The host's forces by id, and the sum of those without one; nothing where no force has an id.
 template <typename Archive, typename Body>
 void visit_forces(Archive& archive, Body& body) {
   archive.whole("forces", body.next_forces, kMostSteps);
@@ -422,7 +422,7 @@ void set_world(std::span<const double> numbers, exmat_world& world) {
   visit_motion(reader, world);
   for (const auto& member : world.members) {
     member.body->state.begins_anew |= holds_modes(member.body->state.attachments);  // whose past it does not hold
-    member.body->forces.clear();                                                    // of which the state has the sum
+    member.body->forces.clear();                                                    // the state has their sum
   }
   world.world.take_states();
   world.contacts.clear();

@@ -216,7 +216,7 @@ void bind_actions(BodyClass& type) {
            "Puts forces of shape (k, 3) [N], world frame, on the points in place of those that had the id.")
       .def(
           "remove_forces", [](BodyObject& body, std::int64_t id) { body.get().remove_forces(id); }, py::arg("id"),
-          "The body then is as if it had never got the forces of this id.")
+          "Ends the forces of this id: the body then is as if it had never got them.")
       .def(
           "restart_integrator", [](BodyObject& body) { body.get().restart_integrator(); },
           "After an abrupt change of forces: keeps the impulse exact, at the price of one step of first order.");

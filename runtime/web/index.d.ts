@@ -192,11 +192,11 @@ export class Body implements Owner {
   /** Adds forces [3k] [N] that stay until they are cleared. */
   applyForces(points: Points, forces: Numbers): void;
   clearForces(): void;
-  /** Adds forces [3k] [N] that can be changed and removed while all others stay to the last bit; their id. */
+  /** Adds forces [3k] [N] that can be changed and removed while all others stay to the last bit. Returns their id. */
   addForces(points: Points, forces: Numbers): number;
   /** Puts forces [3k] [N] in place of those that had the id. */
   setForces(id: number, points: Points, forces: Numbers): void;
-  /** The body then is as if it had never got the forces of this id. */
+  /** Ends the forces of this id: the body then is as if it had never got them. */
   removeForces(id: number): void;
   restartIntegrator(): void;
   setGravity(gravity: Numbers): void;
@@ -253,12 +253,13 @@ export interface Touch {
 export interface RayHit {
   body: Body;
   surface: Surface;
-  /** Of the surface; its corners' shares [3], sum 1, as Surface.pointsOn() and Hand take them. */
+  /** Number of the triangle in the surface. */
   triangle: number;
+  /** Shares of its corners [3], sum 1, as Surface.pointsOn() and Hand take them. */
   shares: number[];
-  /** From the origin of the ray [m] */
+  /** Distance from the origin of the ray [m]. */
   distance: number;
-  /** Unit, outward [3] */
+  /** Unit normal, outward [3]. */
   normal: number[];
 }
 
@@ -269,7 +270,7 @@ export class World implements Owner {
   add<T extends Body>(body: T): T;
   addObstacle(obstacle: Obstacle): number;
   removeObstacle(id: number): void;
-  /** In the last call that stepped the world, a copy. Touches shorter than a call are not told. */
+  /** Touches of the last call that stepped the world, a copy. Those shorter than a call are not told. */
   readonly touches: Touch[];
   /**
    * The first triangle of all bodies, as they are now, that a ray from `origin` [3] [m] along `direction` [3] meets

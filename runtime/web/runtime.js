@@ -271,7 +271,7 @@ export class Body extends Owner {
     this.module.lend(numbers, (address) => this.module.call("body_apply_forces", this.handle, points.handle, address, BigInt(numbers.length)));
   }
   clearForces() { this.module.call("body_clear_forces", this.handle); }
-  /** The id of forces that can be changed and removed while all others stay. */
+  /** Adds forces that can be changed and removed while all others stay. Returns their id. */
   addForces(points, forces) {
     const numbers = doubles(forces);
     return this.module.lend(numbers, (address) =>
@@ -381,7 +381,7 @@ class WorldOfModule extends Owner {
     return this;
   }
   reset() { this.module.call("world_reset", this.handle); }
-  /** Who touched before the last call that stepped the world, or after it, and how that changed. */
+  /** Those that touched before the last call that stepped the world, or after it, and how that changed. */
   get touches() {
     const count = Number(this.module.exports.exmat_world_touches(this.handle)), { bytes } = this.module.structs.touch;
     return this.module.borrow(count * bytes, (address) => {

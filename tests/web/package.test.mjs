@@ -217,7 +217,7 @@ test("a ray through a world meets the first triangle of all bodies", async () =>
     let nearest = Infinity, meets = -1;
     for (let body = 0; body < 3; ++body)
       for (let f = 0; f < triangles.length; f += 3) {
-        // By the plane of the triangle, and the sides of its edges.
+        // The plane of the triangle gives the point, the sides of its edges whether it is inside.
         const [a, b, c] = [0, 1, 2].map((k) => corner(body, f + k)), normal = cross(minus(b, a), minus(c, a));
         const distance = dot(minus(a, origin), normal) / dot(way, normal) * length;
         const at = origin.map((x, k) => x + way[k] / length * distance);

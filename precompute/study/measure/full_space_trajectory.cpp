@@ -16,7 +16,7 @@
 namespace exmat::precompute {
 namespace {
 
-// Those that act at any time, in the order of the scene: the whole body's, then the regions'.
+// Example forces that act at any time, in the order of the scene: the whole body's, then the regions'.
 std::vector<runtime::WeightInfo> acting(const SceneConfig& config, const FullSpaceModel& model) {
   std::vector<runtime::WeightInfo> forces;
   std::size_t i = 0;

@@ -44,7 +44,7 @@ BodyFrames run_full_space(const SceneConfig& config, const ReducedModel& data, c
 
 /// A body in full space, ready to step; settings with keys change as the run time's do.
 struct FullSpaceRun {
-  /// As run_full_space() steps it, but for keys.
+  /// The body that run_full_space() steps, which also takes settings with keys.
   FullSpaceRun(const SceneConfig& config, const ReducedModel& data,
                const std::vector<PoseCoordinates>& coordinates = {});
 

@@ -241,7 +241,8 @@ EXMAT_API exmat_status exmat_body_add_forces(exmat_body* body, const exmat_point
 EXMAT_API exmat_status exmat_body_set_forces(exmat_body* body, int64_t id, const exmat_points* points,
                                              const double* forces, int64_t coordinates) EXMAT_NOEXCEPT;
 
-/* The body then is as if it had never got them: not a bit of the sum of the others is left changed. */
+/* Ends the forces of the id. The body then is as if it had never got them: not a bit of the sum of the others is left
+   changed. An id whose forces do not act is refused. */
 EXMAT_API exmat_status exmat_body_remove_forces(exmat_body* body, int64_t id) EXMAT_NOEXCEPT;
 
 /* Motion of a free body as a whole, world frame: displacement of the centre of mass from rest [m], unit quaternion (w
@@ -328,17 +329,17 @@ EXMAT_API exmat_status exmat_body_set_damping(exmat_body* body, double alpha, do
 EXMAT_API exmat_status exmat_body_set_integrator(exmat_body* body, int32_t integrator) EXMAT_NOEXCEPT;
 
 /* EXMAT_SPACE_...; from the next step on. Positions and momenta stay, but for what the modes cannot hold when the body
-   leaves the full space. The model has to be of space _FULL or _AUTO. Where parts of a body may touch each other it
-   steps in the modes. What holds a body holds it in its modes or in the others: detach it before a change. */
+   leaves the full space. The model has to be of space _FULL or _AUTO. What holds a body holds it in its modes or in the
+   others: detach it before a change. */
 EXMAT_API exmat_status exmat_body_set_space(exmat_body* body, int32_t space) EXMAT_NOEXCEPT;
 
 /* The space that the last step was in: EXMAT_SPACE_REDUCED or EXMAT_SPACE_FULL; negative where `body` is NULL. */
 EXMAT_API int32_t exmat_body_space(const exmat_body* body) EXMAT_NOEXCEPT;
 
-/* Bodies on a skeleton, of surfaces with a skin. Such a body steps in all vertices of its mesh: those that hang on one
-   bone alone go exactly where it goes, all others are flesh. A bone's transform [12] takes it to the world: a 3 x 4
-   matrix by rows, its last column the joint [m], as the world matrix of its node in glTF; where axes are stretched the
-   nearest rotation is taken. */
+/* Bodies on a skeleton, of surfaces with a skin or of tets whose asset names bones. Such a body steps in all vertices
+   of its mesh: those that hang on one bone alone go exactly where it goes, all others are flesh. A bone's transform
+   [12] takes it to the world: a 3 x 4 matrix by rows, its last column the joint [m], as the world matrix of its node in
+   glTF; where axes are stretched the nearest rotation is taken. */
 
 /* Number of bones, and of animations; 0 without a skeleton, negative where `model` is NULL. */
 EXMAT_API int64_t exmat_model_bones(const exmat_model* model) EXMAT_NOEXCEPT;

@@ -343,7 +343,7 @@ class BodyRef {
     check(exmat_body_apply_forces(get(), points.get(), forces.data(), detail::length(forces)));
   }
   void clear_forces() { check(exmat_body_clear_forces(get())); }
-  /// Forces [3k] that can be changed and removed: their id.
+  /// Adds forces [3k] [N] that can be changed and removed. Returns their id.
   std::int64_t add_forces(const Points& points, std::span<const double> forces) {
     std::int64_t id = -1;
     check(exmat_body_add_forces(get(), points.get(), forces.data(), detail::length(forces), &id));

@@ -269,8 +269,8 @@ Placement a_in_b(const BodyPose& a, const BodyPose& b) {
   return relative;
 }
 
-/// The most that a vertex has gone from `then`, of a body that was moved there, too; infinite where only one of the two
-/// is so [m].
+/// The most that a vertex has gone in the frame of its body since the search, which left its places in `then` where
+/// ContactSet::move() had moved the body [m]. Infinite where the body was moved then and is not now, or the reverse.
 double way_from(const VertexArray& then, const ContactSet& set, const VertexArray& places) {
   if (set.is_moved() != (then.rows() > 0)) return std::numeric_limits<double>::infinity();
   return set.is_moved() ? std::sqrt((places - then).rowwise().squaredNorm().maxCoeff()) : 0;
@@ -310,7 +310,10 @@ void gather_from(Gathering& gathering, NearVertices& near, const TestAll& test_a
     near.q_a = a.pose.q;
     near.q_b = b.pose.q;
     const auto keep = [](bool is_moved, const VertexArray& places, VertexArray& kept) {
-      is_moved ? void(kept = places) : kept.resize(0, 3);
+      if (is_moved)
+        kept = places;
+      else
+        kept.resize(0, 3);
     };
     keep(a.set.is_moved(), a.set.places(), near.places_a);
     keep(b.set.is_moved(), b.touching.surface.places(), near.places_b);

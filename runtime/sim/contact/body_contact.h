@@ -72,7 +72,7 @@ struct NearVertices {
   // Poses of the bodies in the search.
   Placement a_in_b;  ///< a in the frame of b
   Eigen::VectorXd q_a, q_b;
-  VertexArray places_a, places_b;  ///< places() of those that ContactSet::move() has moved [k x 3, m]; empty: of others
+  VertexArray places_a, places_b;  ///< places() of bodies that ContactSet::move() moves [k x 3, m]; empty for others
 
   OwnSearch own;  ///< scratch for a body with itself
 };

@@ -12,14 +12,14 @@ namespace exmat::runtime {
 struct TouchingSurface {
   TouchingSurface(const ContactSet& set, BodySurface of, bool meets_itself = false);
 
-  /// From now on of a surface that moves in other ways than by modes, which no bounds tell anything about.
+  /// Drops the bounds: for a surface that moves in other ways than by modes, about which they say nothing.
   void drop_bounds();
 
   /// True if parts of it may have come near to each other at q [r], moving at v [r/s], within a step of `time_step`
   /// [s]. O(r); never, where it does not meet itself, and always without bounds.
   bool may_meet_itself(const Eigen::VectorXd& q, const Eigen::VectorXd& v, double time_step) const noexcept;
 
-  /// The same of a vertex of the set, or for as long as q changes by at most `way` [m].
+  /// The same of a vertex of the set at q, and for as long as q moves no vertex by more than `way` [m].
   bool may_meet_itself(int vertex, const ContactSet& set, const Eigen::VectorXd& q, double way = 0) const noexcept;
 
   BodySurface surface;

@@ -65,7 +65,7 @@ void SceneKeys::set(bool is_free, double midpoint, double end, Eigen::Vector3d& 
   }
 }
 
-void SceneKeys::weigh(const Model& model, StepScene& scene) const noexcept {
+void SceneKeys::set_gravity_force(const Model& model, StepScene& scene) const noexcept {
   if (!gravity.empty()) scene.gravity_force.noalias() = model.gravity_load.transpose() * scene.gravity;
 }
 
@@ -89,12 +89,12 @@ void SceneKeys::apply(const Model& model, std::int64_t steps, StepScene& scene) 
   if (empty()) return;
   const bool is_free = model.frame->rigid_unknowns() > 0;
   scene.begins_anew = apply(is_free, steps, scene.time_step, scene.gravity, scene.examples);
-  weigh(model, scene);
+  set_gravity_force(model, scene);
 }
 
 void SceneKeys::apply_start(const Model& model, StepScene& scene) const noexcept {
   apply_start(scene.gravity, scene.examples);
-  weigh(model, scene);
+  set_gravity_force(model, scene);
 }
 
 }  // namespace exmat::runtime

@@ -56,8 +56,8 @@ struct SceneKeys {
   /// The values at time 0, for what is shown of a start.
   void apply_start(const Model& model, StepScene& scene) const noexcept;
 
-  /// The same of a body without a Model: of its gravity [m/s^2] and its example forces, one for each of the keys'.
-  /// Steps of `time_step` [s]; true if something jumps in this one. `is_free`: nothing holds or carries the body.
+  /// The same for a body without a Model: sets its gravity [m/s^2] and its example forces, one for each of `examples`,
+  /// for a step of `time_step` [s]. True if a setting jumps in it. `is_free`: nothing holds or carries the body.
   bool apply(bool is_free, std::int64_t steps, double time_step, Eigen::Vector3d& gravity_now,
              std::span<ExampleSettings> examples_now) const noexcept;
   void apply_start(Eigen::Vector3d& gravity_now, std::span<ExampleSettings> examples_now) const noexcept;
@@ -65,7 +65,7 @@ struct SceneKeys {
  private:
   void set(bool is_free, double midpoint, double end, Eigen::Vector3d& gravity_now,
            std::span<ExampleSettings> examples_now) const noexcept;
-  void weigh(const Model& model, StepScene& scene) const noexcept;
+  void set_gravity_force(const Model& model, StepScene& scene) const noexcept;
   bool jumps(double from, double to) const noexcept;
 };
 

@@ -13,7 +13,7 @@ FullMember::FullMember(const FullModel& full, const Model& model, const StepScen
       surface_(*model.contact, touching),
       gradient_(Eigen::VectorXd::Zero(full.space.field_size())) {}
 
-/// By the body's frame; on bones, which move it in a frame that stands still, by where it is in the mean.
+/// The surface goes with the body's frame; on bones, whose frame stands still, with the mean of the vertices.
 void FullMember::place_surface() {
   const Placement frame = model_.frame->placement(state_.frame);
   const FrameVelocity moves = model_.frame->velocity(state_.frame);

@@ -58,7 +58,8 @@ class FullMember {
     const SurfacePlace& on = candidates.places[i];
     for (int c = 0; c < 3; ++c) take(surface_.object_corner(on.triangle, c), -on.shares[c]);
   }
-  /// Candidates of the body with itself that push nothing but what something outside moves become forceless.
+  /// Takes the force from candidates of the body with itself whose vertices are all held: by bones, a clamp or a
+  /// motion.
   void drop_driven(BodyCandidates& candidates) const noexcept;
   /// Displacement of a candidate's point by a field x.
   Eigen::Vector3d way(const BodyCandidates& candidates, std::size_t i, bool is_vertex,

@@ -130,7 +130,7 @@ class PairContact {
   void commit(const WorldBody& first, const WorldBody& second, HeldPair& held) const;
 
  private:
-  /// Calls work(at, is_vertex) for the candidates that a side's body is in, and its part in them: the vertex or y.
+  /// Calls work(at, is_vertex) for each list of candidates that a side's body is part of: by its vertices, or by y.
   template <class Work>
   void for_parts(int side, const Work& work) const {
     const auto at = static_cast<std::size_t>(side);

@@ -232,7 +232,7 @@ bool World::is_in_island(int body) const noexcept {
   return !island_of_.empty() && island_of_[static_cast<std::size_t>(body)] >= 0;
 }
 
-/// To touch other bodies, or itself, does not ask for it.
+/// True if a load asks for full space. Contact with other bodies, or with itself, does not.
 bool World::asks_for_full(int body) {
   Member& own = at(body);
   StepReport last = own.report;

@@ -3,10 +3,12 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <numbers>
 #include <set>
+#include <string>
 #include <vector>
 
 #include "common/config/config.h"
@@ -54,6 +56,19 @@ class TetBones : public testing::Test {
   }
   ObjectInput read(const Json& members = Json::object()) { return read_object(asset(members), files_); }
 
+  // Weights of the two bones [v x 2] on an .obj surface.
+  RowMatrix weights_of_render_mesh(const std::string& surface) {
+    folder_.write("skin.obj", surface);
+    const AssetConfig config = asset({{"render_mesh", "skin.obj"}});
+    std::vector<std::string> warnings;
+    const RenderData render = read_render_mesh(config, read_object(config, files_), files_, warnings);
+    RowMatrix weights = RowMatrix::Zero(render.vertices.rows(), 2);
+    for (Eigen::Index v = 0; v < weights.rows(); ++v)
+      for (Eigen::Index k = 0; k < render.bones.cols(); ++k)
+        weights(v, render.bones(v, k)) += render.bone_weights(v, k);
+    return weights;
+  }
+
   // Distance from the line through the middle of the bar [m].
   double off_middle(Eigen::Index v) const { return (mesh_.vertices.row(v).tail(2).array() - 0.5).matrix().norm(); }
 
@@ -90,7 +105,7 @@ TEST_F(TetBones, MayHaveSeveralRoots) {
 }
 
 // Cells are a sixth of a metre across: a vertex beside the middle is 1/6 m from the axis and 1/3 m from the surface.
-// Of the planes at the ends, the first has the joint in its middle, and the last is beyond the axis.
+// The plane at one end has the joint in its middle, that at the other end is beyond the axis.
 TEST_F(TetBones, HoldTheVerticesAboutTheirAxes) {
   const ObjectInput object = read();
   EXPECT_THAT(object.warnings, ElementsAre());
@@ -108,7 +123,7 @@ TEST_F(TetBones, HoldWhatTheAssetFixesInTheirPlace) {
   EXPECT_TRUE(object.skeleton);
 }
 
-// With two cells across, all vertices within lie in the middle.
+// All vertices within a bar of two cells across lie in its middle.
 class ThinTetBones : public TetBones {
  protected:
   ThinTetBones() : TetBones(2) {}
@@ -137,6 +152,19 @@ TEST_F(TetBones, FillTheWeightsBetweenThoseThatAreGiven) {
   }
 }
 
+// The weights are below the one that is left out, and the same everywhere.
+TEST_F(TetBones, MayBeVeryManyAtEachVertex) {
+  constexpr int kBones = 200;
+  bones_ = {{"joints", Json::array()}, {"weights", Json::array()}};
+  for (int i = 0; i < kBones; ++i) {
+    const std::string name = fmt::format("bone {}", i);
+    bones_["joints"].push_back({{"name", name}, {"position", {0.01 * i, 0.5, 0.5}}});
+    bones_["weights"].push_back({{"joint", name}, {"vertices", {7}}});
+  }
+  const RowMatrix weights = read({{"fixed", {{"ids", {7}}}}}).skeleton->weights;
+  EXPECT_LE((weights.array() - 1.0 / kBones).abs().maxCoeff(), 1e-9);
+}
+
 TEST_F(TetBones, CountVerticesAsTheMeshFileDoes) {
   const TetMesh whole = mesh_;
   mesh_.vertices.resize(whole.vertex_count() + 2, 3);
@@ -150,8 +178,8 @@ TEST_F(TetBones, CountVerticesAsTheMeshFileDoes) {
     ASSERT_EQ(object.skeleton->weights(v, 0) > 0, object.mesh.vertices(v, 0) < 2.1) << v;
 }
 
-// At 0.5 s the lower joint has moved by 0.1 m along z, with what hangs on it, and the upper one turned by 60 degrees
-// about its own z, which is the world's x.
+// The lower joint has moved by 0.1 m along z at 0.5 s, with what hangs on it, and the upper one has turned by 60
+// degrees about its own z, which is the world's x.
 TEST_F(TetBones, MoveAsTheirAnimationsSay) {
   const double half = std::numbers::pi / 6;
   bones_["animations"] = Json::parse(R"([ { "name": "twist", "bones": [
@@ -175,14 +203,15 @@ TEST_F(TetBones, MoveAsTheirAnimationsSay) {
 }
 
 TEST_F(TetBones, HoldARenderMeshByTheWeightsOfItsTets) {
-  folder_.write("skin.obj", "v 1 0.5 0.5\nv 2 0.5 0.5\nv 2.25 0 0\nf 1 2 3\n");
-  const AssetConfig config = asset({{"render_mesh", "skin.obj"}});
-  std::vector<std::string> warnings;
-  const RenderData render = read_render_mesh(config, read_object(config, files_), files_, warnings);
-  RowMatrix weights = RowMatrix::Zero(3, 2);
-  for (Eigen::Index v = 0; v < 3; ++v)
-    for (Eigen::Index k = 0; k < render.bones.cols(); ++k) weights(v, render.bones(v, k)) += render.bone_weights(v, k);
+  const RowMatrix weights = weights_of_render_mesh("v 1 0.5 0.5\nv 2 0.5 0.5\nv 2.25 0 0\nf 1 2 3\n");
   EXPECT_LE((weights - (RowMatrix(3, 2) << 1, 0, 0.75, 0.25, 0.375, 0.625).finished()).norm(), 1e-12);
+}
+
+// The last tets, from 3.5 m to 4 m, go from one bone to the other: their affine weights are -0.5 and 1.5 at 4.25 m.
+TEST_F(TetBones, HoldARenderMeshOutsideOfItsTetsByWeightsFrom0To1) {
+  bones_["weights"] = {list("lower", 0, 7, 1), list("upper", 8, 8, 1)};
+  const RowMatrix weights = weights_of_render_mesh("v 4.25 0.5 0.5\nv 3.75 0.5 0.5\nv 3.75 0 0\nf 1 2 3\n");
+  EXPECT_LE((weights - (RowMatrix(3, 2) << 0, 1, 0.5, 0.5, 0.5, 0.5).finished()).norm(), 1e-12);
 }
 
 TEST_F(TetBones, AreAnInputOfTheBundle) {

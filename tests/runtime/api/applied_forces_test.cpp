@@ -22,7 +22,7 @@ struct PushedKind {
   std::int32_t space;
 };
 
-/// Forces by exmat.hpp, on bodies of each kind. Bits are those of the numbers of states.
+/// Forces by exmat.hpp, on bodies of each kind, which are compared by all numbers of their states, to the last bit.
 class AppliedForcesOf : public ::testing::TestWithParam<PushedKind> {
  protected:
   AppliedForcesOf() {
@@ -43,7 +43,7 @@ class AppliedForcesOf : public ::testing::TestWithParam<PushedKind> {
     return body;
   }
 
-  // Of sizes of which a sum keeps few digits of the small ones.
+  // Sizes so far apart that a sum keeps few digits of the small ones.
   static constexpr std::array kFirst{0.1, 0.7, -0.3}, kThird{0.01, -0.2, 0.03};
   static constexpr std::array kSecond{3e5, 1e5, 7e4, -1e5, 0.3, 9e4}, kFourth{0.2, 0.1, 0.0, -0.1, 0.6, 0.3};
   test::TemporaryFolder folder_;

@@ -107,8 +107,8 @@ class FullPotential {
   enum class Tangents { kNone, kExact, kProjected };
   /// Elements at d, and tangents there; `freeze`: those of damping as well, before damping is evaluated.
   void evaluate_elements(const Eigen::VectorXd& d, Tangents tangents, bool freeze) noexcept;
-  /// Of a free body: damping takes off the rigid motion of the body at d from now on. Far from where it was frozen the
-  /// gradient, whose forces of damping have no torque where the body is, is not that of the potential.
+  /// Places the frame of a free body at d: damping takes off rigid motion by it from now on. Where d is far from the
+  /// frame the gradient is not that of the potential, since forces of damping have no torque about the body as it is.
   void place_frame(const Eigen::VectorXd& d) noexcept {
     workspace_.turned = workspace_.start + d;
     model_.rigid->place(workspace_.turned.data(), workspace_.rigid);

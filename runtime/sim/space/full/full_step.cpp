@@ -10,7 +10,7 @@ namespace {
 
 constexpr double kMostPredicted = 0.5;  // of an edge, that an unchecked predictor moves a vertex by
 constexpr double kSlow = 0.1;           // of the residual: tangents that leave more are evaluated again
-constexpr int kFarFromFrozen = 12;      // iterations of a free body, after which its frame is that of where it is
+constexpr int kFarFromFrozen = 12;      // iterations after which the frame of a free body goes along with it
 constexpr int kContactIterations = 60;  // of conjugate gradients near obstacles, at most
 constexpr double kLongStep = 0.008;     // [s]
 constexpr double kDelicate = 0.1;       // of the accuracy, in long steps and without damping of stiffness

@@ -28,7 +28,7 @@ struct Fork {
       if (std::abs(rest(v, 2) - 0.08) < 1e-9) below.push_back(v);
       if (std::abs(rest(v, 2) - 0.16) < 1e-9) above.push_back(v);
     }
-    // Of the lowest modes that which brings the ends of the prongs together most.
+    // The one of the lowest modes that brings the ends of the prongs together most.
     Eigen::Index best = 0;
     for (Eigen::Index j = 0; j < std::min<Eigen::Index>(12, blocks.model->modes()); ++j)
       if (std::abs(closing(j)) > std::abs(closing(best))) best = j;

@@ -8,7 +8,7 @@ namespace {
 
 using test::Fork;
 
-/// Of a fork in its modes, or in all vertices.
+/// A fork in its modes (false) or in all vertices (true).
 class SelfContact : public testing::TestWithParam<bool> {};
 INSTANTIATE_TEST_SUITE_P(Spaces, SelfContact, testing::Bool(),
                          [](const auto& info) { return info.param ? "Full" : "Reduced"; });
