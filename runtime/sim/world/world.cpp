@@ -232,11 +232,16 @@ bool World::is_in_island(int body) const noexcept {
   return !island_of_.empty() && island_of_[static_cast<std::size_t>(body)] >= 0;
 }
 
-/// True if a load asks for full space. Contact with other bodies, or with itself, does not.
+bool World::stepped_with_others(int body) const noexcept {
+  return is_in_island(body) &&
+         islands_[static_cast<std::size_t>(island_of_[static_cast<std::size_t>(body)])]->bodies.size() > 1;
+}
+
+/// True if a load asks for full space. Contact with other bodies does not.
 bool World::asks_for_full(int body) {
   Member& own = at(body);
   StepReport last = own.report;
-  if (is_in_island(body)) last.contacts = 0;
+  if (stepped_with_others(body)) last.contacts = 0;
   return asks_for_full_space(*own.kind.scene, last, *own.state);
 }
 

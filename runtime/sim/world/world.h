@@ -90,7 +90,7 @@ class World {
   std::vector<HeldPair>& held() noexcept { return held_; }
   void take_states();
   /// Contacts with obstacles in the last step of a body that touched no other: they keep one of space `auto` full.
-  int lone_contacts(int body) const noexcept { return is_in_island(body) ? 0 : at(body).report.contacts; }
+  int lone_contacts(int body) const noexcept { return stepped_with_others(body) ? 0 : at(body).report.contacts; }
   /// Set between the two, in place of its last step.
   void set_lone_contacts(int body, int contacts) noexcept {
     at(body).report = {};
@@ -162,6 +162,7 @@ class World {
   void drop_full_scratch(Member& member) noexcept;
   void reserve_full(const BodyKind& kind);
   bool is_in_island(int body) const noexcept;
+  bool stepped_with_others(int body) const noexcept;
   void step_crowd(int threads, StepObserver* observer);
   void remember();
   const HeldPair* held_of(int first, int second) const;

@@ -90,6 +90,27 @@ TEST_P(SelfContact, ABodyAtRestTakesTheStepOfASingleBody) {
   }
 }
 
+// No basis has learned what a part of a body does to another.
+TEST(SelfContactInFullSpace, IsEnteredByABodyThatTouchesItself) {
+  Fork fork(1e-3, false, true);
+  fork.blocks.full_scene.space.space = Space::kAuto;
+  fork.blocks.full_scene.space.release = 0.05;
+  World world({fork.closed_to(0.02, 10, Eigen::Vector3d::Zero(), true)}, {1e8, 1e4, 0.3});
+  int first = -1, last = -1;
+  for (int i = 0; last < 0 || i < last + 60; ++i) {
+    ASSERT_LT(i, 1000);
+    const bool touched_before = last >= 0 && last == i - 1;
+    world.step(1);
+    if (first < 0) EXPECT_FALSE(world.state(0).full) << i;
+    if (touched_before) EXPECT_TRUE(world.state(0).full) << i;
+    if (world.report(0).contacts == 0) continue;
+    if (first < 0) first = i;
+    last = i;
+  }
+  EXPECT_GT(last, first + 3);
+  EXPECT_FALSE(world.state(0).full);
+}
+
 // All modes of a mesh and all of its vertices are one and the same, stepped and searched in two ways.
 TEST(SelfContactInFullSpace, ProngsCloseAsInAllModes) {
   Fork fork(1e-3, false, true);
