@@ -46,7 +46,9 @@ class FidelityOf : public ::testing::TestWithParam<Case> {
 
   ReducedModel build() {
     BuildReport report;
-    ReducedModel model = build_reduced_model(asset_, needs_of(scene_), report, {.scene = &scene_});
+    // Both bundles of a scene have the same stages before training.
+    const BuildOptions options{.cache = folder_ / "cache", .scene = &scene_};
+    ReducedModel model = build_reduced_model(asset_, needs_of(scene_), report, options);
     for (const std::string& warning : report.warnings) SCOPED_TRACE(warning);
     return model;
   }

@@ -3,10 +3,11 @@
 
 Usage: naming.py ROOT BUILD_FOLDER    prints each violation; exit status 1 if there are any.
 
-libclang parses the units of the build without the bodies of functions, which takes a tenth of the time of clang-tidy: most of that goes into
-the templates that bodies instantiate; headers of libraries that most units include are parsed once, which halves the rest. Types and constants
-in bodies are found by their words. The target tidy runs clang-tidy itself.
+libclang parses the units of the build without the bodies of functions, which takes a tenth of the time of clang-tidy:
+most of that goes into the templates that bodies instantiate. Headers that many units include are parsed once, which
+leaves less than a third. Types and constants in bodies are found by their words. The target tidy runs clang-tidy.
 """
+import collections
 import json
 import os
 import re
@@ -24,6 +25,9 @@ FLAGS = ("-I", "-D", "-std=", "-m")
 OPTIONS = TranslationUnit.PARSE_SKIP_FUNCTION_BODIES | TranslationUnit.PARSE_INCOMPLETE
 PRECOMPILED = """Eigen/Dense Eigen/Sparse Eigen/Eigenvalues algorithm array cmath filesystem functional iostream map memory optional random span string
     thread variant vector fmt/format.h fmt/ranges.h nlohmann/json.hpp""".split()
+SHARED = 6  # units that include a header of the project, which is then precompiled
+# But headers of the public classes, whose names classes of other units have too.
+INCLUDED = re.compile(rf'^#include "((?!runtime/(?:python|viewer)/)(?:{"|".join(FOLDERS)})/[^"]+[.]h)"$', re.M)
 CAMEL, CONSTANT, LOWER = r"[A-Z][a-zA-Z0-9]*", r"k[A-Z0-9][a-zA-Z0-9]*", r"([a-z][a-z0-9_]*|minimumOn(Volume|Object))"
 TYPES = (CursorKind.CLASS_DECL, CursorKind.STRUCT_DECL, CursorKind.CLASS_TEMPLATE, CursorKind.CLASS_TEMPLATE_PARTIAL_SPECIALIZATION, CursorKind.ENUM_DECL)
 FUNCTIONS = (CursorKind.FUNCTION_DECL, CursorKind.FUNCTION_TEMPLATE, CursorKind.CXX_METHOD)
@@ -107,29 +111,56 @@ def in_words(texts):
                     yield f"{file}:{text[:match.start(1)].count(chr(10)) + 1}: {what} {match.group(1)}"
 
 
-def with_precompiled(units, folder):
-    """The same units, those for every processor with flags that include PRECOMPILED; as they are where Eigen is not on their path."""
-    portable = [flags for flags, _ in units if not any(flag.startswith("-m") for flag in flags)]
-    paths = dict.fromkeys(flag for flags in portable for flag in flags if flag.startswith("-isystem"))
-    if not any("eigen3" in path for path in paths):
-        return units
+def shared_headers(root, units):
+    """Headers of the project that SHARED units or more include, as they name them."""
+    def reached(file, found):
+        for name in set(INCLUDED.findall(file.read_text("latin-1"))) - found:
+            if (root / name).exists():
+                found.add(name)
+                reached(root / name, found)
+        return found
+
+    of_units = (set().union(*(reached(source, set()) for source in sources_of(unit))) for unit in units)
+    counts = collections.Counter(name for names in of_units for name in names)
+    return sorted(name for name, count in counts.items() if count >= SHARED)
+
+
+def with_precompiled(texts, units, folder):
+    """The same units, those for every processor with flags that include a precompiled header of what many include;
+    and the violations in that header. It leaves out PRECOMPILED where Eigen is not on the path."""
+    portable = [(flags, unit) for flags, unit in units if not any(flag.startswith("-m") for flag in flags)]
+    paths = dict.fromkeys(flag for flags, _ in portable for flag in flags if flag.startswith(("-I", "-isystem")))
+    names = PRECOMPILED if any("eigen3" in path for path in paths) else []
+    names = names + shared_headers(texts.root, [unit for _, unit in portable])
+    if not names:
+        return units, set()
     header, result = folder / "precompiled.h", folder / "precompiled.pch"
-    header.write_text("".join(f"#include <{name}>\n" for name in PRECOMPILED))
-    common = [flag for flag in portable[0] if all(flag in flags for flags in portable)]
-    Index.create().parse(str(header), args=["-x", "c++-header", *common, *paths], options=OPTIONS).save(str(result))
-    return [(flags + ["-include-pch", str(result)] if flags in portable else flags, unit) for flags, unit in units]
+    header.write_text("".join(f"#include <{name}>\n" for name in names))
+    common = [flag for flag in portable[0][0] if all(flag in flags for flags, _ in portable)]
+    parsed = Index.create().parse(str(header), args=["-x", "c++-header", *common, *paths], options=OPTIONS)
+    parsed.save(str(result))
+    more = ["-include-pch", str(result)]
+    extended = [(flags + more if (flags, unit) in portable else flags, unit) for flags, unit in units]
+    return extended, faults(texts, parsed)
+
+
+def faults(texts, parsed):
+    """Errors and violations of what was parsed."""
+    errors = {f"{fault.location.file}:{fault.location.line}: error: {fault.spelling}"
+              for fault in parsed.diagnostics if fault.severity >= Diagnostic.Error}
+    return errors | set(declared(texts, parsed.cursor))
 
 
 def check(texts, flags, unit):
-    parsed = Index.create().parse(str(unit), args=flags, options=OPTIONS)
-    errors = {f"{fault.location.file}:{fault.location.line}: error: {fault.spelling}" for fault in parsed.diagnostics if fault.severity >= Diagnostic.Error}
-    return errors | set(declared(texts, parsed.cursor))
+    """Faults of a unit, those of a precompiled header aside."""
+    return faults(texts, Index.create(excludeDecls=True).parse(str(unit), args=flags, options=OPTIONS))
 
 
 def violations(root, build):
     texts = Texts(root)
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(os.cpu_count()) as pool:
-        found = set().union(*pool.map(lambda unit: check(texts, *unit), with_precompiled(list(units(root, build)), Path(folder))))
+        extended, found = with_precompiled(texts, list(units(root, build)), Path(folder))
+        found = found.union(*pool.map(lambda unit: check(texts, *unit), extended))
     return sorted(found.union(in_words(texts)))
 
 

@@ -232,9 +232,14 @@ inline constexpr T kZero = 0;
             return "\n".join(naming.violations(root, root))
 
     def test_catches_planted_violations(self):
-        found = self.planted({"common/core/x.cpp": '#include "common/core/x.h"\n', "common/core/x.h": self.BAD, "runtime/sim/y.cpp": "int good() { return 1; }\n"})
-        for name in ("type bad_type", "function Function", "constant limit", "constant red", "member bare", "function Inner", "constant most", "type local_type"):
-            self.assertIn(name, found)
+        for units in (1, naming.SHARED):  # the header of many is precompiled
+            files = {f"common/core/x{k}.cpp": '#include "common/core/x.h"\n' for k in range(units)}
+            files |= {"common/core/x.h": "#pragma once\n" + self.BAD, "runtime/sim/y.cpp": "int good();\nint Bad();\n"}
+            found = self.planted(files)
+            for name in ("type bad_type", "function Function", "constant limit", "constant red", "member bare",
+                         "function Inner", "constant most", "type local_type", "function Bad"):
+                self.assertEqual(found.count(name), 1, name)
+            self.assertNotIn("error", found)
 
     def test_let_sound_names_pass(self):
         self.assertEqual(self.planted({"common/core/x.cpp": self.GOOD}), "")
