@@ -199,6 +199,11 @@ class Surfaces(unittest.TestCase):
         printed = self.run_program("check", self.asset(object={"surface": "large.glb"}, examples=bend))
         self.assertIn('object.unit of the asset, "mm" or "cm"', printed)
 
+    def test_check_takes_a_surface(self):
+        printed = self.run_program("check", "tube.glb")
+        for name in ("bend", "twist"):
+            self.assertRegex(printed, rf"{name} +same_connectivity")
+
     def test_poses_of_every_kind_are_the_same_pose(self):
         posed = bent(self.points, 90)
         write_obj(self.folder / "posed.obj", posed, self.triangles)
