@@ -245,12 +245,12 @@ def test_tets_hang_on_the_bones_of_a_file(folder, monkeypatch):
     monkeypatch.chdir(folder)
     mesh, clamp = bar()
     lower = list(range(4 * len(clamp)))  # the half before x = 2
-    pathlib.Path("bar.veg").write_text(mesh)
+    pathlib.Path("boned.veg").write_text(mesh)
     write_json("bones.json", {
         "joints": [{"name": "lower", "position": [0, 0.5, 0.5]}, {"name": "upper", "parent": "lower", "position": [2, 0.5, 0.5]}],
         "weights": [{"joint": "lower", "vertices": lower}, {"joint": "upper", "vertices": list(range(len(lower), 9 * len(clamp)))}]})
-    path = bundle_of(folder / "bar.veg", None, object={
-        "mesh": "bar.veg", "skeleton": "bones.json", "material": {"youngs_modulus": 3e5, "poisson_ratio": 0.4, "density": 1000}})
+    path = bundle_of(folder / "boned.veg", None, object={
+        "mesh": "boned.veg", "skeleton": "bones.json", "material": {"youngs_modulus": 3e5, "poisson_ratio": 0.4, "density": 1000}})
     model = exmat.Model(path, **SETTINGS)
     assert model.bones == {"lower": None, "upper": "lower"}
     body = exmat.Body(model)
