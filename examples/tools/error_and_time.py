@@ -8,10 +8,8 @@ Each body has bundles of r = 20, 30 and 60 modes that learned from its scene. It
 which each pushes a random patch of the surface; the truth are the same loads in all vertices, in steps of 1 ms, each solved to 1e-8. --write also
 renews docs/studies/error_and_time.md and its chart. Half an hour.
 """
-import argparse
 import itertools
 import json
-import pathlib
 import re
 import subprocess
 import sys
@@ -20,15 +18,10 @@ import time
 
 import numpy as np
 
-from hands import FOOT, hand
-from other_loads import ROOT, absolute, error, frames_of, mesh_of, run
+import hands
+from other_loads import ROOT, asset_without_inversion, error, frames_of, mesh_of, parser_of, run
 
-BODIES = {  # push of a hand over the weight, at most; a clamp where the example has none
-    "bar": ("04_bar_cuboid", "recommended", 0.3, {}),
-    "car": ("03_car_wall", "arc_recommended", 0.3, {}),
-    "cross": ("06_cross", "recommended", 0.1, {"fixed": FOOT}),
-    "teddy": ("07_teddy_global", "recommended", 1, {}),
-}
+BODIES = dict(sorted({**hands.BODIES, "car": ("03_car_wall", 0, {})}.items()))  # the car is free: no hand pushes it
 SECONDS = 1.0
 REFERENCE, FRAME = 0.001, 0.008  # [s]
 MODES = [20, 30, 60]
@@ -45,26 +38,19 @@ def frames(step, trajectory):
     return {"output": {"trajectory": trajectory, "every": round(FRAME / step)}}
 
 
-def asset_of(name, kind, clamp):
-    source = ROOT / "examples" / name
-    asset = absolute(json.loads((source / f"asset_{kind}.json").read_text()), source)
-    # References that stay inverted are no truth: this material does not.
-    asset["object"]["material"]["model"] = "stable_neo_hookean"
-    asset["object"] |= clamp
-    return asset
-
-
 def measure(body, programs, output, seeds):
     """For each kind of load and way to step: mean error of each run over its mean displacement, and microseconds of a step."""
-    name, kind, most, clamp = BODIES[body]
+    name, most, clamp = BODIES[body]
+    variant = "arc_recommended" if body == "car" else "recommended"
     folder = output / body
     folder.mkdir(parents=True, exist_ok=True)
     write = lambda path, content: (folder / path).write_text(json.dumps(content, indent=1) + "\n") and folder / path
     source = ROOT / "examples" / name
-    scene = json.loads((source / f"scene_{kind}.json").read_text())
+    scene = json.loads((source / f"scene_{variant}.json").read_text())
     scene |= {"integrator": "bdf2"}
     for modes in MODES:
-        asset = asset_of(name, kind, clamp)
+        asset = asset_without_inversion(source, variant)
+        asset["object"] |= clamp
         asset |= {"basis": {"size": modes, "training": "scene"}}
         learned = write("learned.json", scene | times(0.004) | {"bundle": f"{modes}.h5", "space": "auto", "output": {"trajectory": "unused.h5"}})
         if not (folder / f"{modes}.h5").exists():
@@ -73,7 +59,7 @@ def measure(body, programs, output, seeds):
     mesh = mesh_of(folder / "30.h5")
     loads = {"known": [scene]}
     if mesh["fixed"].any():
-        loads["hands"] = [scene | {"forces": [hand(seed, mesh, most)]} for seed in range(seeds)]
+        loads["hands"] = [scene | {"forces": [hands.hand(seed, mesh, most)]} for seed in range(seeds)]
     found, inverted = {}, 0
     for load, scenes in loads.items():
         for number, loaded in enumerate(scenes):
@@ -206,11 +192,8 @@ def page(results, rows, seeds):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("bodies", nargs="*", metavar="BODY", choices=[[], *BODIES])
-    parser.add_argument("--programs", type=pathlib.Path, default=ROOT / "build/release/bin")
+    parser = parser_of(__doc__, BODIES)
     parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
     output = ROOT / "build/error_and_time"
     output.mkdir(parents=True, exist_ok=True)

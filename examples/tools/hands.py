@@ -7,15 +7,13 @@ Each hand pushes a random patch of the half of the surface that is farthest from
 second, in steps of 4 ms, with the scene's examples acting. The bundle learned from loads of all kinds. --write also renews
 docs/studies/hands.md. Fifteen minutes.
 """
-import argparse
 import json
-import pathlib
 import re
 import subprocess
 
 import numpy as np
 
-from other_loads import ROOT, absolute, frames_of, mesh_of, run
+from other_loads import ROOT, asset_without_inversion, frames_of, mesh_of, parser_of, run
 
 FOOT = {"box": {"min": [-1, -1, -2.21], "max": [1, 1, -2.19]}}
 BODIES = {  # push over the weight, at most; a clamp where the example has none
@@ -47,9 +45,7 @@ def measure(body, programs, output, seeds):
     source, folder = ROOT / "examples" / name, output / body
     folder.mkdir(parents=True, exist_ok=True)
     write = lambda path, content: (folder / path).write_text(json.dumps(content, indent=1) + "\n") and folder / path
-    asset = absolute(json.loads((source / "asset_recommended.json").read_text()), source)
-    # References that stay inverted are no truth: this material does not.
-    asset["object"]["material"]["model"] = "stable_neo_hookean"
+    asset = asset_without_inversion(source)
     asset["object"] |= clamp
     run(folder, programs / "exmat-precompute", "bundle", write("asset.json", asset | {"internal_force": "cubature"}), "-o", "body.h5")
     mesh = mesh_of(folder / "body.h5")
@@ -90,11 +86,8 @@ def page(results, seeds):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("bodies", nargs="*", metavar="BODY", choices=[[], *BODIES])
-    parser.add_argument("--programs", type=pathlib.Path, default=ROOT / "build/release/bin")
+    parser = parser_of(__doc__, BODIES)
     parser.add_argument("--seeds", type=int, default=12)
-    parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
     results = {body: measure(body, options.programs.resolve(), ROOT / "build/hands", options.seeds) for body in options.bodies or BODIES}
     print(page(results, options.seeds))

@@ -111,10 +111,15 @@ def absolute(asset, source):
     return asset
 
 
-def trained_asset(asset, source, training, scene):
-    asset = absolute(asset, source)
-    # References that stay inverted are no truth: this material does not.
+def asset_without_inversion(source, variant="recommended"):
+    """An asset of an example, absolute(). References that stay inverted are no truth: its material does not."""
+    asset = absolute(json.loads((source / f"asset_{variant}.json").read_text()), source)
     asset["object"]["material"]["model"] = "stable_neo_hookean"
+    return asset
+
+
+def trained_asset(source, training, scene):
+    asset = asset_without_inversion(source)
     asset |= {"internal_force": "cubature", "cubature": {"elements": ELEMENTS}}
     asset["basis"] |= {"size": MODES, "training": {"nothing": "none", "the scene": "scene", "declared loads": "loads", "all kinds": "auto"}[training]}
     if training == "declared loads":
@@ -163,11 +168,10 @@ def measure(body, programs, output):
     source, folder = ROOT / "examples" / name, output / body
     folder.mkdir(parents=True, exist_ok=True)
     scene = json.loads((source / "scene_recommended.json").read_text()) | times
-    asset = json.loads((source / "asset_recommended.json").read_text())
     write = lambda path, content: (folder / path).write_text(json.dumps(content, indent=1) + "\n") and folder / path
     for k, training in enumerate(TRAININGS):
         learned_from = write("scene.json", scene | {"bundle": f"{k}.h5", "output": {"trajectory": "unused.h5"}})
-        made_of = write(f"asset_{k}.json", trained_asset(asset, source, training, scene))
+        made_of = write(f"asset_{k}.json", trained_asset(source, training, scene))
         of_a_scene = [] if training == "all kinds" else ["--scene", learned_from]
         run(folder, programs / "exmat-precompute", "bundle", made_of, "-o", f"{k}.h5", "--cache", "cache", *of_a_scene)
     mesh = mesh_of(folder / "0.h5")
@@ -209,12 +213,17 @@ def page(tables):
     return "\n".join(lines) + "\n"
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("bodies", nargs="*", metavar="BODY", choices=[[], *BODIES])
+def parser_of(description, bodies):
+    """Of the arguments that tools which measure bodies share."""
+    parser = argparse.ArgumentParser(description=description, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("bodies", nargs="*", metavar="BODY", choices=[[], *bodies])
     parser.add_argument("--programs", type=pathlib.Path, default=ROOT / "build/release/bin")
     parser.add_argument("--write", action="store_true")
-    options = parser.parse_args()
+    return parser
+
+
+def main():
+    options = parser_of(__doc__, BODIES).parse_args()
     output = ROOT / "build/other_loads"
     tables = {body: measure(body, options.programs.resolve(), output) for body in options.bodies or BODIES}
     print(page(tables))
