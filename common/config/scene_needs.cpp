@@ -24,12 +24,18 @@ void set_trajectory(const std::optional<std::filesystem::path>& file, WorldConfi
   for (BodiesConfig& bodies : world.bodies) bodies.scene.trajectory = file;
 }
 
-void require_weights(const SceneConfig& scene, const ExampleForceConfig& force, const std::string& member,
-                     Eigen::Index examples) {
-  if (!force.weights || force.weights->size() == examples) return;
-  throw InputError({scene.file.string(), scene.place + '/' + member + "/weights",
-                    std::to_string(examples) + " numbers, one for each example of " + scene.bundle.string(),
-                    std::to_string(force.weights->size()), "the first is that of the rest pose"});
+void require_weights(const SceneConfig& scene, const std::vector<Eigen::Index>& examples) {
+  auto expected = examples.begin();
+  const auto require = [&](const ExampleForceConfig& force, const std::string& member) {
+    const Eigen::Index count = *expected++;
+    if (!force.weights || force.weights->size() == count) return;
+    throw InputError({scene.file.string(), scene.place + '/' + member + "/weights",
+                      std::to_string(count) + " numbers, one for each example of " + scene.bundle.string(),
+                      std::to_string(force.weights->size()), "the first is that of the rest pose"});
+  };
+  if (scene.examples) require(*scene.examples, "examples");
+  for (std::size_t i = 0; i < scene.regions.size(); ++i)
+    require(scene.regions[i].force, "regions/" + std::to_string(i));
 }
 
 void require_uncompensated(const SceneConfig& scene) {

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "common/config/named_file.h"
 #include "common/config/scene_config.h"
@@ -24,10 +25,9 @@ std::vector<NamedFile> obstacle_files(const SceneConfig& scene);
 /// require_files() of the obstacles alone.
 void require_obstacle_files(const SceneConfig& scene);
 
-/// Throws InputError where an example force, a `member` of the scene, is given weights, but not one for each of its
-/// `examples`.
-void require_weights(const SceneConfig& scene, const ExampleForceConfig& force, const std::string& member,
-                     Eigen::Index examples);
+/// Throws InputError where an example force of the scene is given weights, but not one for each of its examples:
+/// `examples` has their numbers, of the whole body's force, if there is one, then of the regions'.
+void require_weights(const SceneConfig& scene, const std::vector<Eigen::Index>& examples);
 
 /// Throws InputError where the scene, of a body on bones or whose clamp follows examples, has examples.compensate.
 void require_uncompensated(const SceneConfig& scene);

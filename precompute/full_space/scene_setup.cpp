@@ -39,10 +39,9 @@ void require_supported(const SceneConfig& config, const std::vector<VertexForceC
   require_part(!config.obstacles.empty(), model.contacts.has_value(), "/contact");
   const std::size_t groups = (config.examples ? 1 : 0) + config.regions.size();
   require_part(groups > 0, model.examples.size() == groups, config.examples ? "/examples" : "/regions");
-  auto examples = model.examples.begin();
-  if (config.examples) require_weights(config, *config.examples, "examples", (examples++)->count());
-  for (std::size_t i = 0; i < config.regions.size(); ++i)
-    require_weights(config, config.regions[i].force, "regions/" + std::to_string(i), (examples++)->count());
+  std::vector<Eigen::Index> examples;
+  for (const FullSpaceExamples& own : model.examples) examples.push_back(own.count());
+  require_weights(config, examples);
   for (std::size_t i = 0; i < forces.size(); ++i)
     for (const std::int64_t vertex : forces[i].vertices)
       if (vertex < 0 || vertex >= model.rest.rows())

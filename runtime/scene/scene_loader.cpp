@@ -263,10 +263,9 @@ std::vector<std::vector<NamedPose>> named_poses(const LoadedScene& loaded) {
 }
 
 void check_weights(const SceneConfig& config, const Model& model) {
-  auto examples = model.examples.begin();
-  if (config.examples) require_weights(config, *config.examples, "examples", (examples++)->weights.examples());
-  for (std::size_t i = 0; i < config.regions.size(); ++i)
-    require_weights(config, config.regions[i].force, fmt::format("regions/{}", i), (examples++)->weights.examples());
+  std::vector<Eigen::Index> examples;
+  for (const ExampleModel& own : model.examples) examples.push_back(own.weights.examples());
+  require_weights(config, examples);
 }
 
 // Targets that make up for one stiffness and gravity are wrong with others.

@@ -103,12 +103,6 @@ FullSpaceModel model_of(const SceneConfig& config, const ReducedModel& data,
   return build_full_space_model(data, options);
 }
 
-void require_no_keys(const SceneConfig& config) {
-  if (const std::string keys = place_of_keys(config); !keys.empty())
-    throw InputError({config.file.string(), keys, "a value: studies take no keys", "keys",
-                      "measure scenes with the values between the keys, one by one"});
-}
-
 // [n] shares of the mass in the motion of the centre [kg].
 Eigen::VectorXd vertex_masses(const ReducedModel& data) {
   const SparseMatrix mass = scalar_mass(data.object->mesh, data.object->materials.density);
@@ -184,6 +178,12 @@ std::string target_of(const runtime::LoadedScene& loaded) {
   for (std::size_t i = 0; i < loaded.scene.examples.size(); ++i)
     if (runtime::acts(loaded.scene.examples[i])) return loaded.model->examples[i].table ? "table" : "solve";
   return "none";
+}
+
+void require_no_keys(const SceneConfig& config) {
+  if (const std::string keys = place_of_keys(config); !keys.empty())
+    throw InputError({config.file.string(), keys, "a value: studies take no keys", "keys",
+                      "measure scenes with the values between the keys, one by one"});
 }
 
 ReducedRun run_reduced(const SceneConfig& config, const std::vector<double>& times) {

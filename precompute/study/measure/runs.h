@@ -36,6 +36,9 @@ std::string target_of(const runtime::LoadedScene& loaded);
 /// at a number that is not finite.
 ReducedRun run_reduced(const SceneConfig& config, const std::vector<double>& times);
 
+/// Throws InputError at a setting with keys, which no study takes.
+void require_no_keys(const SceneConfig& config);
+
 /// The same in full space, of the body of a whole bundle, from the deformation that the reduced scene begins at.
 /// `coordinates`, as FullSpaceOptions has them, hold all targets; none: all poses that descriptors stand for. Both
 /// throw InputError at a setting with keys.

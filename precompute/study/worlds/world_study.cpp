@@ -16,6 +16,7 @@
 #include "common/mesh/assembly.h"
 #include "precompute/inputs/inputs.h"
 #include "precompute/study/measure/error_json.h"
+#include "precompute/study/measure/runs.h"
 #include "precompute/study/sweep/pareto.h"
 #include "precompute/study/sweep/point_result.h"
 #include "precompute/study/sweep/study_plan.h"
@@ -106,9 +107,7 @@ WorldStudy::WorldStudy(const StudyConfig& config, const StudyOptions& options)
 
 void WorldStudy::require_measurable() const {
   for (const BodiesConfig& bodies : world_.bodies) {
-    if (const std::string keys = place_of_keys(bodies.scene); !keys.empty())
-      refuse(world_.file, keys, "a value: studies take no keys", "keys",
-             "measure scenes with the values between the keys, one by one");
+    require_no_keys(bodies.scene);
     if (!bodies.scene.body.motion.empty())
       refuse(world_.file, bodies.scene.place + "/body/motion", "no motion: the full space carries no bodies", "one",
              "");

@@ -29,7 +29,7 @@ void TouchingSurface::drop_bounds() {
 
 bool TouchingSurface::may_meet_itself(const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                                       double time_step) const noexcept {
-  if (approach_bounds.size() == 0) return !places.empty();
+  if (approach_bounds.size() == 0) return false;
   return approach_bounds.dot(q.cwiseAbs() + kContactMarginSteps * time_step * v.cwiseAbs()) >= 1;
 }
 

@@ -15,11 +15,14 @@ struct TouchingSurface {
   /// Drops the bounds: for a surface that moves in other ways than by modes, about which they say nothing.
   void drop_bounds();
 
+  bool meets_itself() const noexcept { return !places.empty(); }
+
   /// True if parts of it may have come near to each other at q [r], moving at v [r/s], within a step of `time_step`
-  /// [s]. O(r); never, where it does not meet itself, and always without bounds.
+  /// [s]. O(r); never, where it does not meet itself.
   bool may_meet_itself(const Eigen::VectorXd& q, const Eigen::VectorXd& v, double time_step) const noexcept;
 
-  /// The same of a vertex of the set at q, and for as long as q moves no vertex by more than `way` [m].
+  /// The same of a vertex of the set at q, and for as long as q moves no vertex by more than `way` [m]; always, without
+  /// bounds.
   bool may_meet_itself(int vertex, const ContactSet& set, const Eigen::VectorXd& q, double way = 0) const noexcept;
 
   BodySurface surface;

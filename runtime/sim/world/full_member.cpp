@@ -13,7 +13,7 @@ FullMember::FullMember(const FullModel& full, const Model& model, const StepScen
       surface_(*model.contact, touching),
       gradient_(Eigen::VectorXd::Zero(full.space.field_size())) {}
 
-/// The surface goes with the body's frame; on bones, whose frame stands still, with the mean of the vertices.
+/// The surface goes with the body's frame; on bones, whose frame stands still, with the mean of the flesh.
 void FullMember::place_surface() {
   const Placement frame = model_.frame->placement(state_.frame);
   const FrameVelocity moves = model_.frame->velocity(state_.frame);
@@ -22,14 +22,12 @@ void FullMember::place_surface() {
   };
   const auto velocity = [&](int vertex) { return full_velocity(full_, frame, moves, *state_.full, vertex); };
   if (!full_.skin) return surface_.place(frame, moves, position, velocity);
+  const auto mean_of = [](const Eigen::VectorXd& field) -> Eigen::Vector3d {
+    return Eigen::Map<const Eigen::Matrix3Xd>(field.data(), 3, field.size() / 3).rowwise().mean();
+  };
   Placement mean = frame;
-  FrameVelocity mean_moves;
-  const double share = 1 / static_cast<double>(full_.rest.rows());
-  for (int vertex = 0; vertex < full_.rest.rows(); ++vertex) {
-    mean.position += share * (position(vertex) - frame.position);
-    mean_moves.linear += share * velocity(vertex);
-  }
-  surface_.place(mean, mean_moves, position, velocity);
+  mean.position += mean_of(state_.full->q);
+  surface_.place(mean, FrameVelocity{.linear = mean_of(state_.full->v)}, position, velocity);
 }
 
 bool FullMember::begin(const StepScene& scene, double pushed) noexcept {

@@ -466,11 +466,8 @@ void World::find_pairs(int threads) {
     if (!std::ranges::binary_search(near_.begin(), near_.begin() + static_cast<std::ptrdiff_t>(others), link.bodies) &&
         (near_.size() == others || near_.back() != link.bodies))
       near_.push_back(link.bodies);
-  for (const int body : touching_) {
-    const TouchingBody own = touching(body).touching_body();
-    if (own.touching.may_meet_itself(own.pose.q, own.velocity.v, touching(body).scene().time_step))
-      near_.emplace_back(body, body);
-  }
+  for (const int body : touching_)
+    if (touching(body).may_meet_itself()) near_.emplace_back(body, body);
   if (near_.size() > others) std::ranges::sort(near_);
   keep_pairs();
 }

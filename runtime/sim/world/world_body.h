@@ -68,6 +68,10 @@ struct WorldBody {
             {model.frame->placement(state.frame), state.q},
             BodyVelocity{model.frame->velocity(state.frame), state.v}};
   }
+  /// True if parts of it may touch each other in the step.
+  bool may_meet_itself() const noexcept {
+    return full ? touching->meets_itself() : touching->may_meet_itself(state.q, state.v, scene().time_step);
+  }
   /// At the iterate, of a body in full space.
   FullSide full_side() const { return {*full, full->surface(), placement}; }
   /// Puts the surface where the state says, for searches.

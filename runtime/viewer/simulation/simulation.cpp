@@ -230,7 +230,7 @@ void Simulation::rebuild(std::size_t kind, const Settings& settings) {
 }
 
 void Simulation::reset() {
-  if (moved_bones_) rebuild(0, kinds_.front().settings);  // bones that a host gives end an animation
+  if (moved_bones_) rebuild(0, Settings(kinds_.front().settings));  // bones that a host gives end an animation
   bodies_.world().reset();
   grips_.clear();
   joint_hands_.clear();
