@@ -10,7 +10,7 @@
 namespace exmat::precompute {
 
 /// Eigenfunctions of an object that are looked through for how many carry a pose.
-inline constexpr Eigen::Index kMostEigenfunctions = 200;
+inline constexpr Eigen::Index kMostEigenfunctions = 400;
 
 /// Counts the eigenfunctions of an object that a pose needs. They are computed when it is first asked.
 class FunctionCounter {

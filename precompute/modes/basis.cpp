@@ -18,6 +18,8 @@ constexpr double kSnapshotAmplitude = 0.25;
 constexpr double kRankTolerance = 1e-9;
 // Share of an example's displacement that a basis of its own choice of size may lose.
 constexpr double kFieldLoss = 0.05;
+// The same of one that learns from the motions of a scene: more is a pose that they do not show.
+constexpr double kUnshownLoss = 0.15;
 // Share of modes beside the motions of a scene, in norm.
 constexpr double kUnseenShare = 0.03;
 
@@ -98,6 +100,12 @@ Eigen::MatrixXd unit_fields(const ElasticSystem& system, Eigen::MatrixXd fields)
   return fields;
 }
 
+// Largest share of a field of unit norm that an orthonormal basis does not hold.
+double largest_loss(const SparseMatrix& mass, const Eigen::MatrixXd& basis, Eigen::MatrixXd fields) {
+  remove_components(mass, basis, fields);
+  return std::sqrt(fields.cwiseProduct(mass * fields).colwise().sum().maxCoeff());
+}
+
 // Example fields may take as many modes of a basis.
 Eigen::Index most_fields(int size) { return std::max({1, size / 2, size - kBasisSize / 2}); }
 
@@ -143,13 +151,19 @@ Eigen::MatrixXd trained_basis(const BasisInput& input, const Eigen::MatrixXd& sn
   Eigen::MatrixXd columns(snapshots.rows(), snapshots.cols() + modal.cols());
   columns << of_unit_norm(norm, snapshots), (general ? 1 : kUnseenShare) * modal;
   remove_components(system.mass, system.null_space, columns);
-  Eigen::MatrixXd basis(columns.rows(), 0);
-  if (input.example_fields.cols() > most_fields(kBasisSize))  // more than runs of a few loads show
-    basis = principal_components(system.mass, unit_fields(system, input.example_fields), most_fields(size));
-  fill_up(system, norm, std::move(columns), size, basis);
-  orthonormalise(system.mass, basis);
-  finish(input, basis);
-  return basis;
+  const auto with_first = [&](Eigen::MatrixXd basis) {
+    fill_up(system, norm, columns, size, basis);
+    orthonormalise(system.mass, basis);
+    finish(input, basis);
+    return basis;
+  };
+  if (input.example_fields.cols() == 0) return with_first(Eigen::MatrixXd(columns.rows(), 0));
+  const Eigen::MatrixXd fields = unit_fields(system, input.example_fields);
+  if (fields.cols() <= most_fields(kBasisSize)) {  // runs of a few loads may show them by themselves
+    Eigen::MatrixXd basis = with_first(Eigen::MatrixXd(columns.rows(), 0));
+    if (largest_loss(system.mass, basis, fields) <= kUnshownLoss) return basis;
+  }
+  return with_first(principal_components(system.mass, fields, most_fields(size)));
 }
 
 }  // namespace exmat::precompute

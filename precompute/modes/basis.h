@@ -24,7 +24,9 @@ Eigen::MatrixXd modal_basis(const BasisInput& input, int size);
 
 /// The same of `snapshots` [f x N] of motions: their principal components in the norm M + K / omega_5^2, which weighs
 /// displacement and strain alike. What modal_basis() is made of is mixed in with 3 % of their norm, so that loads which
-/// no run had find the lowest modes. Fields of so many examples that basis_size_for() takes more for them come first.
+/// no run had find the lowest modes. Example fields come first where the basis would lose 15 % of one, since a scene
+/// need not show the poses that a host will ask for, and where they are so many that basis_size_for() takes more for
+/// them.
 /// With `general` both have the same norm, in M + K / omega_1^2: for loads that the snapshots do not know. Throws as
 /// modal_basis() does, of all this.
 Eigen::MatrixXd trained_basis(const BasisInput& input, const Eigen::MatrixXd& snapshots, bool general, int size);
