@@ -218,10 +218,13 @@ void Hdf5File::close() {
 
 void require_format(const std::filesystem::path& file, const std::string& role, const std::string& kind,
                     const FileSchema& schema) {
-  const auto& signature = Superblock::kSignature;
-  require_kind(file, role, kind, {reinterpret_cast<const char*>(signature.data()), signature.size()});
   std::error_code ignored;
   if (!std::filesystem::exists(file, ignored)) return;
+  const Superblock superblock = read_superblock(file);
+  if (!superblock.has_signature() && lower_extension(file) == ".h5" && kind_of_file(file, superblock.text()).empty())
+    return;
+  const auto& signature = Superblock::kSignature;
+  require_kind(file, role, kind, {reinterpret_cast<const char*>(signature.data()), signature.size()});
   const std::optional<std::string> found = format_of(file);
   if (found && *found != schema.format)
     refuse_to_replace(file, role, kind, found->empty() ? "an HDF5 file of another format" : "an " + *found);
