@@ -1,6 +1,7 @@
 #include "common/core/command_files.h"
 
 #include <algorithm>
+#include <fstream>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "common/core/error.h"
+#include "common/core/input_file.h"
 
 namespace exmat {
 namespace {
@@ -156,6 +158,23 @@ void claim_output(const std::filesystem::path& file, const std::string& role) {
   require_regular(file, role);
   require_folder(file, role);
   claim(file, role);
+}
+
+void refuse_to_replace(const std::filesystem::path& file, const std::string& role, const std::string& kind,
+                       const std::string& found) {
+  throw InputError({file.string(), role, kind + " to replace, or the name of a new file", found,
+                    "choose another name, or remove it first"});
+}
+
+void require_kind(const std::filesystem::path& file, const std::string& role, const std::string& kind,
+                  std::string_view beginning) {
+  std::string bytes(std::max<std::size_t>(beginning.size(), 32), '\0');
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  bytes.resize(static_cast<std::size_t>(stream.gcount()));
+  if (bytes.empty() || bytes.starts_with(beginning)) return;
+  const std::string_view found = kind_of_file(file, bytes);
+  refuse_to_replace(file, role, kind, found.empty() ? "another kind of file" : std::string(found));
 }
 
 void claim_folder(const std::filesystem::path& folder, const std::string& role) {

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 namespace exmat {
 
@@ -24,8 +25,18 @@ void claim_output(const std::filesystem::path& file, const std::string& role);
 /// The same of a file that is about to be written, now and perhaps again: it is not claimed.
 void check_output(const std::filesystem::path& file, const std::string& role);
 
-/// The same of a folder that the command fills, before the files in it. Throws InputError also where it is a file, or
-/// is not there and cannot be made.
+/// Throws InputError where `file` is there, is not empty, and begins otherwise than what the command would write over
+/// it: nothing but an earlier output of its kind is replaced. `kind` names that in messages, as "a trajectory". Call it
+/// once the inputs are known, whose own message says more, and before any work.
+void require_kind(const std::filesystem::path& file, const std::string& role, const std::string& kind,
+                  std::string_view beginning);
+
+/// The message of require_kind() about a file that is of the kind `found`.
+[[noreturn]] void refuse_to_replace(const std::filesystem::path& file, const std::string& role, const std::string& kind,
+                                    const std::string& found);
+
+/// Announces a folder that the command fills, as claim_output() does, before the files in it. Throws InputError also
+/// where it is a file, or is not there and cannot be made.
 void claim_folder(const std::filesystem::path& folder, const std::string& role);
 
 /// Announces that `file` is about to be read; `expected` is for messages ("a JSON file"). Throws InputError where there

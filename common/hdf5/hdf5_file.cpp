@@ -112,6 +112,20 @@ void check_before_opening(const std::filesystem::path& file) {
                     fmt::format("the file is cut short by {}{} bytes", end ? "" : "at least ", expected - size)});
 }
 
+/// The format that the file says; empty where it says none, nothing where it cannot be read.
+std::optional<std::string> format_of(const std::filesystem::path& file) {
+  try {
+    const OwnOutputRead own;
+    const Hdf5File open = Hdf5File::open(file);
+    if (!open.has_attribute("/", "format")) return "";
+    const AttributeValue value = open.read_attribute("/", "format");
+    const auto* const text = std::get_if<std::string>(&value);
+    return text == nullptr ? "" : *text;
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
 std::string name_by_index(hid_t group, hsize_t index) {
   const ssize_t length = H5Lget_name_by_idx(group, ".", H5_INDEX_NAME, H5_ITER_INC, index, nullptr, 0, H5P_DEFAULT);
   if (length <= 0) return {};
@@ -200,6 +214,20 @@ std::size_t Hdf5File::capacity() const { return saturating_product(file_size(han
 void Hdf5File::close() {
   if (handle_.get() >= 0) require(H5Fflush(handle_.get(), H5F_SCOPE_GLOBAL), name_, "");
   if (!handle_.close()) fail_writing(name_, "");
+}
+
+void require_format(const std::filesystem::path& file, const std::string& role, const std::string& kind,
+                    const FileSchema& schema) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(file, ignored)) return;
+  const Superblock superblock = read_superblock(file);
+  if (!superblock.has_signature() && lower_extension(file) == ".h5" && kind_of_file(file, superblock.text()).empty())
+    return;
+  const auto& signature = Superblock::kSignature;
+  require_kind(file, role, kind, {reinterpret_cast<const char*>(signature.data()), signature.size()});
+  const std::optional<std::string> found = format_of(file);
+  if (found && *found != schema.format)
+    refuse_to_replace(file, role, kind, found->empty() ? "an HDF5 file of another format" : "an " + *found);
 }
 
 void Hdf5File::create_group(const std::string& path) {

@@ -131,6 +131,12 @@ class Hdf5File {
   std::string name_;
 };
 
+/// Throws InputError where `file` holds something else than an earlier output of this format, called `kind`, as
+/// require_kind() does (common/core/command_files.h). A damaged file passes, and one of no known kind whose extension
+/// is .h5.
+void require_format(const std::filesystem::path& file, const std::string& role, const std::string& kind,
+                    const FileSchema& schema);
+
 /// Program and version: "exmat 1.2.3".
 std::string generator_name();
 

@@ -1,13 +1,26 @@
 #include "common/hdf5/xdmf.h"
 
+#include <array>
 #include <fmt/format.h>
+#include <utility>
 
 #include "common/core/command_files.h"
 #include "common/core/error.h"
 #include "common/core/markup.h"
+#include "common/hdf5/hdf5_file.h"
 
 namespace exmat {
 namespace {
+
+constexpr std::string_view kBeginning = "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">";
+
+/// The .xdmf files of a trajectory, and how messages name them.
+std::array<std::pair<std::filesystem::path, std::string>, 2> files_beside(const std::filesystem::path& trajectory,
+                                                                          const std::string& role) {
+  const std::string stem = (trajectory.parent_path() / trajectory.stem()).string();
+  return {{{stem + ".xdmf", "the .xdmf beside " + role},
+           {stem + "_render.xdmf", "the .xdmf of the render mesh beside " + role}}};
+}
 
 /// A hyperslab of the vertices on the shared cells.
 std::string xdmf_grid(const std::string& h5, const XdmfCells& drawn, std::size_t frames, std::size_t frame,
@@ -45,15 +58,19 @@ void claim_trajectory(const std::filesystem::path& trajectory, const std::string
     throw InputError({trajectory.string(), role, "an HDF5 file, beside which the .xdmf is written", "\".xdmf\"",
                       "give it the extension .h5"});
   claim_output(trajectory, role);
-  const std::filesystem::path beside = trajectory.parent_path() / trajectory.stem();
-  claim_output(beside.string() + ".xdmf", "the .xdmf beside " + role);
-  claim_output(beside.string() + "_render.xdmf", "the .xdmf of the render mesh beside " + role);
+  for (const auto& [file, beside] : files_beside(trajectory, role)) claim_output(file, beside);
+}
+
+void require_trajectory_kind(const std::filesystem::path& trajectory, const std::string& role,
+                             const FileSchema& schema) {
+  require_format(trajectory, role, "a trajectory", schema);
+  for (const auto& [file, beside] : files_beside(trajectory, role)) require_kind(file, beside, "an .xdmf", kBeginning);
 }
 
 std::string xdmf_text(const std::filesystem::path& trajectory, const std::vector<XdmfPart>& parts,
                       const std::vector<double>& times) {
   const std::string h5 = escaped(trajectory.filename().string());
-  std::string text = "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n";
+  std::string text = std::string(kBeginning) + "\n  <Domain>\n";
   if (parts.size() == 1) {
     text += fmt::format("    <Grid Name=\"{}\" GridType=\"Collection\" CollectionType=\"Temporal\">\n",
                         escaped(parts.front().name));

@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "common/hdf5/schema.h"
+
 namespace exmat {
 
 /// The cells that an .xdmf shows, and the datasets of its HDF5 file that hold them and the frames of their vertices.
@@ -23,6 +25,11 @@ struct XdmfPart {
 /// Claims a trajectory and the .xdmf files beside it as outputs of the command; `role` as for claim_output(). Throws
 /// InputError, also where the trajectory has the extension .xdmf.
 void claim_trajectory(const std::filesystem::path& trajectory, const std::string& role);
+
+/// Throws InputError where one of these files is there and no earlier output of its kind: `kind`, as "a trajectory", of
+/// the format `schema` (require_format()).
+void require_trajectory_kind(const std::filesystem::path& trajectory, const std::string& role,
+                             const FileSchema& schema);
 
 /// Text of the .xdmf beside `trajectory`, in its folder: one grid for each time [s], whose vertices are float32
 /// [times x vertices x 3]; of several parts a collection of such grids.

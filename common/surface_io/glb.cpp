@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::string_view kGlbMagic = "glTF";
 constexpr std::uint32_t kGlbVersion = 2, kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
-constexpr std::size_t kGlbHeaderBytes = 12;
+constexpr std::size_t kGlbHeaderBytes = 12, kChunkHeaderBytes = 8;
 
 void append_chunk(std::string& glb, std::uint32_t kind, std::string_view bytes, char padding) {
   const auto append = [&](std::uint32_t value) {
@@ -39,17 +39,21 @@ GlbParts parts_of_glb(const std::string& file, std::string_view bytes) {
     cursor.fail(fmt::format("a file of {} bytes", length), std::to_string(bytes.size()),
                 length > bytes.size() ? "is the file cut off?" : "is the file damaged?");
   GlbParts parts;
-  for (std::size_t end = kGlbHeaderBytes; end + 8 <= length;) {
+  std::size_t end = kGlbHeaderBytes;
+  while (end + kChunkHeaderBytes <= length) {
     const auto size = cursor.read_binary<std::uint32_t>("the length of a chunk");
     const auto kind = cursor.read_binary<std::uint32_t>("the kind of a chunk");
     if (parts.json.empty() && kind != kJsonChunk) cursor.fail("a chunk of JSON first", fmt::format("{:#x}", kind));
     const auto chunk = cursor.read_bytes(size, fmt::format("a chunk of {} bytes", size));
     if (kind == kJsonChunk && parts.json.empty()) parts.json = chunk;
     if (kind == kBinaryChunk && !parts.buffer) parts.buffer = chunk;
-    end += 8 + std::size_t{size};
+    end += kChunkHeaderBytes + std::size_t{size};
     if (parts.json.empty()) cursor.fail("JSON", "an empty chunk");
   }
   if (parts.json.empty()) cursor.fail("a chunk of JSON", "the end of the file");
+  if (end < length)
+    cursor.fail("the end of the file, or another chunk", fmt::format("{} bytes that are none", length - end),
+                "is the file damaged?");
   return parts;
 }
 

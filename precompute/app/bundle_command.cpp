@@ -2,16 +2,19 @@
 
 #include <filesystem>
 #include <fmt/format.h>
+#include <fstream>
 #include <optional>
 #include <utility>
 
 #include "common/bundle/bundle.h"
+#include "common/bundle/file_schemas.h"
 #include "common/config/config.h"
 #include "common/config/json_file.h"
 #include "common/core/atomic_file.h"
 #include "common/core/command_files.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
+#include "common/hdf5/hdf5_file.h"
 #include "common/mesh/geometry.h"
 #include "precompute/app/asset_input.h"
 #include "precompute/examples/alignment_report.h"
@@ -150,6 +153,18 @@ void claim_outputs(const BundleOptions& options, const AssetConfig& asset, const
   for (const NamedFile& named : obstacle_files(*scene)) check_input(named.file, named.kind);
 }
 
+/// Refuses to replace what is no earlier output of its kind, once all inputs are known.
+void require_kinds(const BundleOptions& options) {
+  require_format(options.bundle, "-o", "a bundle", bundle_schema());
+  if (!options.report.empty())
+    require_kind(options.report, "--report", "a report", "{\n  \"format\": \"exmat-report\"");
+  if (options.depfile.empty()) return;
+  std::ifstream stream(options.depfile);
+  std::string line;
+  if (std::getline(stream, line) && !line.ends_with(':') && !line.ends_with(": \\"))
+    refuse_to_replace(options.depfile, "--depfile", "a depfile", "another kind of file");
+}
+
 /// Sets `model` where it makes one.
 void make_bundle(const BundleOptions& options, RunReport& report, std::optional<ReducedModel>& model) {
   check_files(options);
@@ -157,6 +172,7 @@ void make_bundle(const BundleOptions& options, RunReport& report, std::optional<
   std::optional<SceneConfig> scene;
   if (!options.scene.empty()) scene = load_scene(options.scene);
   claim_outputs(options, asset, scene);
+  require_kinds(options);
   if (!options.write_asset.empty()) write_assumed_asset(options.asset, options.write_asset);
   const Needs needs = precompute::resolve_needs(asset, scene_needs(options, scene, asset));
   const precompute::BuildOptions build{options.alignment_report, options.cache, scene ? &*scene : nullptr,

@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include "common/bundle/file_schemas.h"
 #include "common/config/config.h"
+#include "common/core/command_files.h"
 #include "common/core/log.h"
 #include "common/hdf5/xdmf.h"
 #include "precompute/study/measure/full_space_trajectory.h"
@@ -33,6 +35,9 @@ void full_space_command(const FullSpaceCommandOptions& options) {
   claim_trajectory(options.trajectory, "-o");
   SceneConfig config = load_scene(options.scene);
   require_files(config);
+  check_input(config.bundle, "a bundle");
+  for (const NamedFile& named : obstacle_files(config)) check_input(named.file, named.kind);
+  require_trajectory_kind(options.trajectory, "-o", trajectory_schema());
   if (options.steps) config.steps = *options.steps;
   if (options.every) config.every = *options.every;
   const precompute::FullSpaceSummary summary = precompute::write_full_space(config, options.trajectory);

@@ -41,6 +41,7 @@ void mesh_command(const MeshCommandOptions& options) {
   if (lower_extension(options.mesh) != ".msh")
     throw InputError({options.mesh, "", "a mesh to write with the extension .msh", "another", ""});
   const SurfaceFile surface = precompute::read_surface_file(options.surface);
+  require_kind(options.mesh, "-o", "a mesh in the format .msh 2.2", "$MeshFormat\n2.2 0 8\n");
   precompute::log_notes(surface, options.surface);
   precompute::warn_of_flat_body(surface.mesh, options.surface);
   const precompute::Cage cage = precompute::make_cage(surface.mesh, options.settings, options.surface);

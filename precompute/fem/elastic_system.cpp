@@ -25,21 +25,26 @@ Eigen::MatrixXd raw_rigid_motions(const VertexArray& nodes, const Eigen::Vector3
   return motions;
 }
 
-// Whatever the rest of the body is like: a clamp may be small beside it.
 void require_clamped(const VertexArray& nodes, const FlagVector& fixed) {
-  Eigen::MatrixX3d points(fixed.cast<Eigen::Index>().sum(), 3);
-  for (Eigen::Index v = 0, row = 0; v < nodes.rows(); ++v)
-    if (fixed[v] != 0) points.row(row++) = nodes.row(v);
-  points.rowwise() -= points.colwise().mean().eval();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(points.transpose() * points);
-  const auto& squares = svd.singularValues();
-  if (points.rows() >= 3 && squares[1] > kClampRank * kClampRank * squares[0]) return;
+  if (are_clamp(nodes, fixed)) return;
   throw InputError({"", "/object/fixed", "at least three fixed vertices that are not on one line",
                     std::to_string(fixed.cast<int>().sum()) + " that leave the body free to move rigidly",
                     "fix more of them"});
 }
 
 }  // namespace
+
+// Whatever the rest of the body is like: a clamp may be small beside it.
+bool are_clamp(const VertexArray& nodes, const FlagVector& fixed) {
+  Eigen::MatrixX3d points(fixed.cast<Eigen::Index>().sum(), 3);
+  for (Eigen::Index v = 0, row = 0; v < nodes.rows(); ++v)
+    if (fixed[v] != 0) points.row(row++) = nodes.row(v);
+  if (points.rows() < 3) return false;
+  points.rowwise() -= points.colwise().mean().eval();
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(points.transpose() * points);
+  const auto& squares = svd.singularValues();
+  return squares[1] > kClampRank * kClampRank * squares[0];
+}
 
 Eigen::MatrixXd ElasticSystem::restrict(const Eigen::MatrixXd& fields) const { return fields(free_dofs, Eigen::all); }
 

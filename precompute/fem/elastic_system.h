@@ -36,6 +36,10 @@ ElasticSystem build_elastic_system(const TetMesh& mesh, const TetMaterials& mate
 ElasticSystem eliminate_fixed(const VertexArray& nodes, SparseMatrix mass, SparseMatrix stiffness,
                               const FlagVector& fixed);
 
+/// True if the vertices of `nodes` [n x 3] that `fixed` [n] flags leave the body no rigid motion: they are at least
+/// three and do not lie on one line.
+bool are_clamp(const VertexArray& nodes, const FlagVector& fixed);
+
 /// [3n x 6] translations along and rotations about the axes through the centre of mass, M-orthonormal.
 Eigen::MatrixXd rigid_motions(const VertexArray& nodes, const SparseMatrix& mass);
 

@@ -10,6 +10,7 @@
 #include "common/mesh/checks.h"
 #include "common/mesh/geometry.h"
 #include "precompute/cache/sha256.h"
+#include "precompute/fem/elastic_system.h"
 #include "precompute/inputs/correspondence_files.h"
 #include "precompute/inputs/object_materials.h"
 #include "precompute/inputs/object_size.h"
@@ -142,6 +143,30 @@ SkeletonData skeleton_of_tets(const std::filesystem::path& path, const CheckedMe
     throw InputError({path.string(), "/weights", "vertices that belong to tets", "none", ""});
   fill_weights(checked.file.mesh, skeleton.weights);
   return skeleton;
+}
+
+// Fixes the vertices that the object's bones hold. Refuses bones, of `file` at `place`, that hold all vertices, or so
+// few that the body turns about them.
+void pin_to_bones(ObjectInput& object, const SurfaceTree& surface, const std::filesystem::path& file,
+                  const char* place) {
+  const VertexArray& vertices = object.mesh.vertices;
+  object.fixed = pin_to_bones(vertices, surface, *object.skeleton, object.warnings);
+  const FlagVector& fixed = object.fixed;
+  if (fixed.all())
+    throw InputError(
+        {file.string(), place, "a vertex of the tets that no joint holds", "all of them held",
+         "let vertices hang on several joints, make more tets, or fix fewer by /object/fixed of the asset"});
+  if (!fixed.any() || are_clamp(vertices, fixed)) return;
+  std::string held;
+  for (Eigen::Index b = 0; b < object.skeleton->weights.cols(); ++b) {
+    const auto own = (fixed.array() != 0 && object.skeleton->weights.col(b).array() == 1).count();
+    if (own > 0)
+      held += fmt::format("{}{} by the joint \"{}\"", held.empty() ? "" : ", ", own,
+                          object.skeleton->bones[static_cast<std::size_t>(b)]);
+  }
+  throw InputError(
+      {file.string(), place, "joints that hold at least three vertices, which are not on one line", held,
+       "let more vertices hang on a joint alone, make more tets, or fix some by /object/fixed of the asset"});
 }
 
 // Weights of the bones [v x b] at points in tets. A point outside of its tet hangs on no bone by less than 0 or more
@@ -468,14 +493,12 @@ ObjectInput read_object(const AssetConfig& asset, InputFiles& files, StageCache&
   object.fixed = flag(asset.fixed, 0);
   if (object.surface && object.surface->file().skeleton) {
     object.skeleton = skeleton_of_cage(*object.surface);
-    if (!asset.fixed)
-      object.fixed = pin_to_bones(object.mesh.vertices, object.surface->tree(), *object.skeleton, object.warnings);
+    if (!asset.fixed) pin_to_bones(object, object.surface->tree(), asset.object_mesh, "/skins");
   } else if (asset.object_skeleton) {
     object.skeleton = skeleton_of_tets(*asset.object_skeleton, checked, files);
     if (!asset.fixed)
-      object.fixed =
-          pin_to_bones(object.mesh.vertices, SurfaceTree(object.mesh.vertices, surface_triangles(object.mesh.tets)),
-                       *object.skeleton, object.warnings);
+      pin_to_bones(object, SurfaceTree(object.mesh.vertices, surface_triangles(object.mesh.tets)),
+                   *asset.object_skeleton, "/weights");
   }
   if (asset.clamp_follows && !object.skeleton) object.skeleton = clamp_bone(object.mesh, object.fixed);
   object.contact = flag(asset.contact_vertices, 1);

@@ -347,6 +347,11 @@ Json parse_with_cut_names(const std::string& file, std::string_view text) {
 }  // namespace
 
 Json parse_gltf(const std::string& file, std::string_view text) {
+  text = text.substr(0, text.find_last_not_of(std::string_view(" \0", 2)) + 1);  // some programs pad by zeros
+  // nlohmann would end the text there and leave the rest unread.
+  if (const auto nul = text.find('\0'); nul != std::string_view::npos)
+    throw InputError(
+        {file, "", "JSON", fmt::format("character U+0000 after {} bytes of it", nul), "is the file damaged?"});
   if (is_too_deep(text)) throw InputError({file, "", fmt::format("JSON of at most {} levels", kDeepest), "more", ""});
   try {
     return Json::parse(text);

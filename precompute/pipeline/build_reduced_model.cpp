@@ -392,17 +392,7 @@ void Pipeline::add_fidelity(const BodyStages& stages, const Motions& motions, co
   log::info(fmt::format("fidelity: {:.2f} % from {} in {} held-out runs, {:.2f} % of modes alone; {}",
                         100 * found.shape_error, motions.elements ? "a body of many modes" : "the full space",
                         found.heldout_runs, 100 * found.modal_error, found.advice));
-  constexpr double kWorse = 1.1, kSmall = 0.02;  // times the error of modes; an error that is none
-  constexpr double kFar = 0.1;                   // an error that shows
-  if (found.shape_error > std::max(kWorse * found.modal_error, kSmall))
-    warn(report_.warnings,
-         fmt::format(
-             "training made the body worse: it is {:.2g} % from the full space in held-out runs, modes alone with "
-             "all elements {:.2g} %; {}, or basis.training \"none\"",
-             100 * found.shape_error, 100 * found.modal_error, found.advice));
-  else if (found.shape_error > kFar)
-    warn(report_.warnings, fmt::format("in held-out runs the body is {:.2g} % from the full space: {}",
-                                       100 * found.shape_error, found.advice));
+  if (const std::string warning = warning_of(found); !warning.empty()) warn(report_.warnings, warning);
 }
 
 void Pipeline::settle_examples(const BodyStages& stages, ReducedModel& model) {

@@ -128,6 +128,20 @@ struct Sizes {
 
 }  // namespace
 
+std::string warning_of(const FidelityData& fidelity) {
+  constexpr double kWorse = 1.1, kSmall = 0.02;  // times the error of modes; an error that is none
+  constexpr double kFar = 0.1;                   // an error that shows
+  const double error = 100 * fidelity.shape_error;
+  if (fidelity.shape_error > std::max(kWorse * fidelity.modal_error, kSmall))
+    return fmt::format(
+        "training made the body worse: it is {:.2g} % from the full space in held-out runs, modes alone with all "
+        "elements {:.2g} %; {}, or basis.training \"none\"",
+        error, 100 * fidelity.modal_error, fidelity.advice);
+  if (fidelity.shape_error > kFar)
+    return fmt::format("in held-out runs the body is {:.2g} % from the full space: {}", error, fidelity.advice);
+  return "";
+}
+
 std::string tried_text(const std::vector<Chain>& runs, const TrainingRunOptions& options, bool free) {
   const Sizes sizes(runs, free);
   std::vector<std::string> tried;

@@ -27,6 +27,10 @@ struct FidelityInput {
 /// kind of load it is largest, what the runs tried and what they did not.
 FidelityData fidelity_of(const FidelityInput& input);
 
+/// Words about a body that is far from the full space, or farther than one of modes alone, which training made worse;
+/// empty where it is neither.
+std::string warning_of(const FidelityData& fidelity);
+
 /// Words for the kinds and sizes of the loads of these runs, how long they last and their damping. Gravity is left out
 /// of a `free` body, which it does not deform.
 std::string tried_text(const std::vector<Chain>& runs, const TrainingRunOptions& options, bool free);

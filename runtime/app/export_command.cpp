@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <map>
 #include <numbers>
+#include <string_view>
 #include <utility>
 
 #include "common/bundle/bundle.h"
@@ -10,6 +11,7 @@
 #include "common/core/error.h"
 #include "common/core/input_file.h"
 #include "common/mesh/geometry.h"
+#include "common/surface_io/glb.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/print.h"
 #include "runtime/export/drawn_skin.h"
@@ -22,6 +24,7 @@ namespace exmat::runtime {
 namespace {
 
 constexpr double kMegabyte = 1e6;
+constexpr std::string_view kGltfGenerator = "\"generator\":\"exmat-runtime ";  // as write_gltf() writes it
 constexpr double kMotionTolerance = 1e-6;  // RMS, of the size: what components leave out of a motion
 constexpr double kDegree = std::numbers::pi / 180;
 
@@ -254,14 +257,42 @@ void export_gltf(const ExportOptions& options) {
         fmt::format("{:.3g} MB; as a point cache {:.3g} MB", megabytes, static_cast<double>(cached) / kMegabyte));
 }
 
+/// Refuses to replace a .glb of another program: it may be what the body was made of. A damaged one passes.
+void require_own_gltf(const std::filesystem::path& file) {
+  std::error_code ignored;
+  if (!std::filesystem::exists(file, ignored) || std::filesystem::file_size(file, ignored) == 0) return;
+  try {
+    const OwnOutputRead own;
+    const std::string bytes = read_whole_file(file, "a .glb");
+    if (parts_of_glb(file.string(), bytes).json.find(kGltfGenerator) != std::string_view::npos) return;
+  } catch (const InputError&) {
+    return;
+  }
+  refuse_to_replace(file, "-o", "a .glb of exmat-runtime", "that of another program");
+}
+
 }  // namespace
 
 void export_command(const ExportOptions& options) {
   const std::string extension = lower_extension(options.output);
   claim_output(options.output, "-o");
-  if (extension == ".pc2") return export_point_cache(options);
-  if (extension == ".usda") return export_usd(options);
-  if (extension == ".glb") return export_gltf(options);
+  const auto begin = [&](const char* kind, std::string_view beginning) {
+    if (!options.trajectory.empty()) check_input(options.trajectory, "an HDF5 file");
+    require_kind(options.output, "-o", kind, beginning);
+  };
+  if (extension == ".pc2") {
+    begin("a point cache", "POINTCACHE2");
+    return export_point_cache(options);
+  }
+  if (extension == ".usda") {
+    begin("a USD file", "#usda 1.0\n(\n    defaultPrim");
+    return export_usd(options);
+  }
+  if (extension == ".glb") {
+    begin("a .glb", "glTF");
+    require_own_gltf(options.output);
+    return export_gltf(options);
+  }
   throw InputError({options.output.string(), "", "an output with the extension .glb, .usda or .pc2",
                     extension.empty() ? "none" : '"' + extension + '"',
                     extension == ".abc" ? "Alembic is not written: programs that read it read .usda or .pc2" : ""});

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "common/bundle/bundle.h"
+#include "common/bundle/pack_store.h"
 #include "common/config/config.h"
 #include "common/core/command_files.h"
 #include "common/core/error.h"
@@ -68,6 +69,7 @@ void pack_command(const PackOptions& options) {
   if (summary.is_pack)
     throw InputError({options.bundle.string(), "", "a bundle (HDF5)", "a pack", "pack the bundle that it was made of"});
   const BundleRequest request = request_of(options, summary);
+  require_kind(options.output, "-o", "a pack", kPackMagic);
   write_pack(read_bundle(options.bundle, request), options.output);
   print("pack", options.output.string());
   print("bytes", fmt::format("{} of the bundle's {}", bytes_of(options.output), bytes_of(options.bundle)));

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <fmt/format.h>
 
+#include "common/bundle/file_schemas.h"
 #include "common/config/config.h"
 #include "common/core/command_files.h"
 #include "common/core/error.h"
@@ -13,6 +14,7 @@
 #include "runtime/app/lost_work.h"
 #include "runtime/app/print.h"
 #include "runtime/scene/scene_run.h"
+#include "runtime/scene/state_file.h"
 
 namespace exmat::runtime {
 namespace {
@@ -102,11 +104,20 @@ void print_profile(const RunSummary& summary, bool touches) {
     print_stage(kWorldStageNames[stage], summary.stage_seconds->of_world[stage]);
 }
 
+std::string trajectory_role(const RunCommandOptions& options) {
+  return options.trajectory ? "-o" : "output.trajectory of the scene";
+}
+
 void claim_outputs(const WorldConfig& config, const RunCommandOptions& options) {
-  if (config.trajectory)
-    claim_trajectory(*config.trajectory, options.trajectory ? "-o" : "output.trajectory of the scene");
+  if (config.trajectory) claim_trajectory(*config.trajectory, trajectory_role(options));
   if (options.run.dump_state) claim_output(*options.run.dump_state, "--dump-state");
   if (options.run.from_state) check_input(*options.run.from_state, "a state file");
+}
+
+/// Once all inputs are known: nothing else than earlier outputs is replaced.
+void require_kinds(const WorldConfig& config, const RunCommandOptions& options) {
+  if (config.trajectory) require_trajectory_kind(*config.trajectory, trajectory_role(options), trajectory_schema());
+  if (options.run.dump_state) require_kind(*options.run.dump_state, "--dump-state", "a state file", kStateBeginning);
 }
 
 void warn_of_steps(const RunSummary& summary, const WorldConfig& config) {
@@ -179,6 +190,7 @@ void run_command(const RunCommandOptions& options) {
   if (options.steps) config.steps = *options.steps;
   claim_outputs(config, options);
   const LoadedWorld loaded = load_world_run(config);
+  require_kinds(config, options);
   log_loaded(loaded, config);
   warn_of_places(loaded);
   RunOptions run_options = options.run;

@@ -1,12 +1,16 @@
 #pragma once
 
 #include <filesystem>
+#include <string_view>
 
 #include "runtime/scene/bodies.h"
 
 namespace exmat::runtime {
 
 // States of bodies as files (schemas/state.json), so that a run can be taken up elsewhere, to the last bit.
+
+/// The bytes that each begins with.
+inline constexpr std::string_view kStateBeginning = "{\n \"format\": \"exmat-state\"";
 
 /// Appears whole or not at all. Throws WorkError. The states are finite, as those that a step leaves are.
 void write_state(const BodiesMemory& memory, const LoadedWorld& loaded, const WorldConfig& config,

@@ -35,6 +35,7 @@ SOURCES = {
     "csv": [SURFACE_IO + "height_reader.cpp"],
     "pc2": [MESH_IO + "point_cache_reader.cpp"],
     "json": ["common/config/"],
+    "skeleton": ["precompute/inputs/skeleton_file.cpp", MESH_IO + "animation_frames.cpp"],
     "bundle": BUNDLE,
     "bundle_edits": BUNDLE,
     "pack": ["common/bundle/"],

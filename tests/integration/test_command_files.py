@@ -17,7 +17,7 @@ import unittest
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent))
-from programs import bar, write_json  # noqa: E402
+from programs import Glb, bar, write_json  # noqa: E402
 
 PROGRAMS = Path(sys.argv.pop(1)).resolve()
 PRECOMPUTE, RUNTIME = PROGRAMS / "exmat-precompute", PROGRAMS / "exmat-runtime"
@@ -112,6 +112,47 @@ class Commands(unittest.TestCase):
         for name in ("rest.veg", "bent.veg", "part.txt"):
             for outputs in (["-o", name], ["-o", "new.h5", "--report", name], ["-o", "new.h5", "--depfile", name]):
                 self.refused("bundle", "examples.json", "--scene", "scene.json", *outputs, said=[name, "does not read"])
+
+    def test_nothing_but_an_earlier_output_is_replaced(self):
+        """Files that no command reads, as those that the bundle of a scene was made of, or a model that a .glb is exported beside."""
+        self.command("run", "scene.json", "-o", "t.h5", "--dump-state", "state.json")
+        self.command("bundle", "asset.json", "-o", "other.h5", "--report", "report.json", "--depfile", "bar.d")
+        Glb().write(self.folder / "model.glb")
+        (self.folder / "kept.xdmf").write_text("<Xdmf/>")
+        (self.folder / "kept.msh").write_text("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n")
+        (self.folder / "to").symlink_to("bar.veg")
+        for name, found in (("asset.json", "a JSON file"), ("bar.veg", "a .veg mesh"), ("to", "a .veg mesh"), ("state.json", "a JSON file"), ("other.h5", "an exmat-bundle")):
+            for command in ("run", "full-space"):
+                self.refused(command, "scene.json", "-o", name, said=[f"{name}: -o: expected a trajectory to replace, or the name of a new file, found {found}"])
+        for command in ("run", "full-space"):
+            self.refused(command, "scene.json", "-o", "kept.h5", said=["kept.xdmf: the .xdmf beside -o: expected an .xdmf to replace"])
+        for name in ("asset.json", "bar.veg", "t.h5"):
+            self.refused("run", "scene.json", "--dump-state", name, said=["--dump-state: expected a state file to replace"])
+        for name in ("scene.json", "ground.obj", "t.h5", "report.json"):
+            self.refused("bundle", "asset.json", "-o", name, said=["-o: expected a bundle to replace"])
+            self.refused("pack", "bar.h5", "-o", name, said=["-o: expected a pack to replace"])
+        for option, name, said in (("--report", "scene.json", "a report"), ("--report", "ground.obj", "a report"), ("--depfile", "scene.json", "a depfile"), ("--depfile", "ground.obj", "a depfile")):
+            self.refused("bundle", "asset.json", "-o", "new.h5", option, name, said=[f"{option}: expected {said} to replace"])
+        self.refused("mesh", "surface.obj", "-o", "kept.msh", said=["-o: expected a mesh in the format .msh 2.2 to replace"])
+        self.refused("export", "t.h5", "-o", "model.glb", said=["-o: expected a .glb of exmat-runtime to replace", "found that of another program"])
+        for ending in (".glb", ".usda", ".pc2"):
+            shutil.copy(self.folder / "ground.obj", self.folder / ("kept" + ending))
+            self.refused("export", "t.h5", "-o", "kept" + ending, said=["to replace, or the name of a new file"])
+
+    def test_earlier_outputs_are_replaced(self):
+        for name in ("t.h5", "t.xdmf", "state.json", "report.json", "bar.d", "bar.exmat", "t.glb", "t.usda", "t.pc2", "tets.msh"):
+            (self.folder / name).touch()
+        for _ in range(2):
+            self.command("bundle", "asset.json", "-o", "bar.h5", "--report", "report.json", "--depfile", "bar.d")
+            self.command("run", "scene.json", "-o", "t.h5", "--dump-state", "state.json")
+            self.command("pack", "bar.h5", "-o", "bar.exmat")
+            self.command("mesh", "surface.obj", "-o", "tets.msh", "--cells", 50)
+            for ending in (".glb", ".usda", ".pc2"):
+                self.command("export", "t.h5", "-o", "t" + ending)
+            self.command("full-space", "scene.json", "-o", "t.h5")
+        damaged = (self.folder / "bar.h5").read_bytes()[:3000]
+        (self.folder / "bar.h5").write_bytes(damaged)
+        self.command("bundle", "asset.json", "-o", "bar.h5")
 
     def test_a_body_where_numbers_lose_its_shape_is_warned_of(self):
         asset = json.loads((self.folder / "asset.json").read_text())

@@ -190,7 +190,8 @@ void FreeFrame::add_motion(double share, const FrameVelocity& added, FrameWorksp
 
 bool FreeFrame::is_finite(const FrameWorkspace& workspace) const noexcept {
   const FreeMotionWorkspace& free = own_free(workspace);
-  return free.moved.position.allFinite() && free.moved.linear_momentum.allFinite() &&
+  // Places are read in single precision, too.
+  return free.moved.position.cast<float>().allFinite() && free.moved.linear_momentum.allFinite() &&
          free.moved.angular_momentum.allFinite() && free.solution.spin.allFinite() &&
          free.solution.rotation.allFinite();
 }

@@ -164,5 +164,20 @@ TEST(CommandFiles, CheckOutputsWithoutClaimingThem) {
   EXPECT_THAT(refusal_of([&] { check_output(other, "Save"); }), HasSubstr("that of -o"));
 }
 
+TEST(RequireKind, LetsOnlyFilesOfTheKindBeReplaced) {
+  const TemporaryFolder folder;
+  const auto refusal = [&](const std::filesystem::path& file) {
+    return refusal_of([&] { require_kind(file, "-o", "a trajectory", "\x89HDF"); });
+  };
+  EXPECT_EQ(refusal(folder.path() / "new"), "");
+  EXPECT_EQ(refusal(folder.write("empty", "")), "");
+  EXPECT_EQ(refusal(folder.write("own", "\x89HDF and more")), "");
+  EXPECT_THAT(refusal(folder.write("asset.json", "{}")),
+              HasSubstr("-o: expected a trajectory to replace, or the name of a new file, found a JSON file"));
+  EXPECT_THAT(refusal(folder.write("short", "\x89HD")), HasSubstr("found another kind of file"));
+  std::filesystem::create_symlink("asset.json", folder.path() / "link");
+  EXPECT_THAT(refusal(folder.path() / "link"), HasSubstr("found a JSON file"));
+}
+
 }  // namespace
 }  // namespace exmat

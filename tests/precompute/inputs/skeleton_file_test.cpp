@@ -224,6 +224,29 @@ TEST_F(TetBones, AreAnInputOfTheBundle) {
   EXPECT_EQ(found->place, "/object/skeleton");
 }
 
+// One bone holds two vertices, the other hangs with it on all others.
+TEST_F(TetBones, AreRefusedWhereTheyHoldTooFewVertices) {
+  bones_["weights"] = {list("lower", 0, 8, 1), list("upper", 0, 8, 1)};
+  for (const std::size_t alone : {7, 9}) bones_["weights"][1]["weights"][alone] = 0;
+  const Complaint complaint = test::complaint_of([this] { read(); });
+  EXPECT_EQ(complaint.file, folder_.path("bones.json"));
+  EXPECT_EQ(complaint.place, "/weights");
+  EXPECT_THAT(complaint.expected, HasSubstr("joints that hold at least three vertices"));
+  EXPECT_EQ(complaint.found, "2 by the joint \"lower\"");
+  EXPECT_THAT(complaint.advice, HasSubstr("/object/fixed of the asset"));
+  EXPECT_EQ(read({{"fixed", {{"ids", {0, 8, 72}}}}}).fixed.cast<int>().sum(), 3);
+}
+
+TEST_F(TetBones, AreRefusedWhereTheyHoldAllVertices) {
+  mesh_.vertices = (VertexArray(4, 3) << 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1).finished();
+  mesh_.tets = (TetArray(1, 4) << 0, 1, 2, 3).finished();
+  write_msh(mesh_, folder_.path("bar.msh"));
+  bones_["weights"] = {list("lower", 0, 2, 1)};
+  const Complaint complaint = test::complaint_of([this] { read(); });
+  EXPECT_EQ(complaint.file, folder_.path("bones.json"));
+  EXPECT_EQ(complaint.found, "all of them held");
+}
+
 TEST_F(TetBones, AreRefusedWithThePlaceOfTheFault) {
   struct Fault {
     const char* patch;  // as in RFC 6902

@@ -463,6 +463,30 @@ TEST_F(ReadGltf, RefusesDeepJsonAndWhatIsNone) {
   EXPECT_EQ(complaint_of([&] { read_gltf(other); }).expected, "JSON");
 }
 
+// The text ends at a zero byte: padding may follow, nothing else.
+TEST_F(ReadGltf, RefusesWhatFollowsJson) {
+  const std::string whole = square().glb();
+  const std::size_t text = 20, end = whole.find("BIN") - 4;
+  const auto with = [&](const std::string& tail) {
+    std::string bytes = whole;
+    const std::size_t last = bytes.find_last_of('}', end) + 1;
+    std::string chunk = bytes.substr(text, last - text) + tail;
+    chunk.append((4 - chunk.size() % 4) % 4, ' ');
+    std::string glb = bytes.substr(0, text) + chunk + bytes.substr(end);
+    for (std::size_t k = 0; k < 4; ++k) {
+      glb[8 + k] = static_cast<char>(glb.size() >> (8 * k));
+      glb[12 + k] = static_cast<char>(chunk.size() >> (8 * k));
+    }
+    return folder_.write("tail.glb", glb);
+  };
+  const auto padded = with(std::string(4, '\0'));
+  EXPECT_NO_THROW(read_gltf(padded));
+  const auto hidden = with(std::string("\0{}", 3));
+  EXPECT_THAT(complaint_of([&] { read_gltf(hidden); }).found, HasSubstr("character U+0000"));
+  const auto more = with(" {}");
+  EXPECT_EQ(complaint_of([&] { read_gltf(more); }).expected, "JSON");
+}
+
 TEST_F(ReadGltf, RefusesDamagedContainers) {
   const std::string whole = square().glb();
   const auto refused = [&](std::size_t byte, char value) {
@@ -478,6 +502,10 @@ TEST_F(ReadGltf, RefusesDamagedContainers) {
   EXPECT_EQ(tail.expected, "a file of " + std::to_string(whole.size()) + " bytes");
   EXPECT_EQ(tail.found, std::to_string(whole.size() + 4));
   EXPECT_THAT(refused(15, 1).expected, HasSubstr("a chunk of"));
+  std::string padded = whole + "tail";
+  padded[8] = static_cast<char>(padded[8] + 4);
+  const auto stray = folder_.write("stray.glb", padded);
+  EXPECT_EQ(complaint_of([&] { read_gltf(stray); }).found, "4 bytes that are none");
   EXPECT_EQ(refused(16, 'X').expected, "a chunk of JSON first");
   EXPECT_THAT(refused(0, 'X').expected, "JSON");
 }

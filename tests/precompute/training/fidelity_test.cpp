@@ -1,9 +1,12 @@
 #include "precompute/training/fidelity.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 namespace exmat::precompute {
 namespace {
+
+using ::testing::HasSubstr;
 
 TEST(FidelityText, NamesWhatWasTriedAndWhatWasNot) {
   Segment heavy, pulled, pushed;
@@ -44,6 +47,29 @@ TEST(FidelityText, NamesThrowsAndElasticExamples) {
       "0 1/s and stiffness damping 0 s");
   EXPECT_EQ(untried_text({{thrown}}, true),
             "stiffer examples, forces on vertices, hands, stronger or weaker loads, longer runs, other damping");
+}
+
+FidelityData fidelity(double shape_error, double modal_error) {
+  FidelityData data;
+  data.shape_error = shape_error;
+  data.modal_error = modal_error;
+  data.advice = "more cubature.elements";
+  return data;
+}
+
+TEST(FidelityWarning, SaysThatTrainingMadeTheBodyWorse) {
+  EXPECT_EQ(warning_of(fidelity(0.77, 0.58)),
+            "training made the body worse: it is 77 % from the full space in held-out runs, modes alone with all "
+            "elements 58 %; more cubature.elements, or basis.training \"none\"");
+  EXPECT_THAT(warning_of(fidelity(0.034, 0.03)), HasSubstr("training made the body worse"));
+  EXPECT_EQ(warning_of(fidelity(0.032, 0.03)), "") << "within a tenth";
+  EXPECT_EQ(warning_of(fidelity(0.019, 0.001)), "") << "an error that is none";
+}
+
+TEST(FidelityWarning, SaysThatTheBodyIsFarFromTheFullSpace) {
+  EXPECT_EQ(warning_of(fidelity(0.11, 0.2)),
+            "in held-out runs the body is 11 % from the full space: more cubature.elements");
+  EXPECT_EQ(warning_of(fidelity(0.09, 0.2)), "");
 }
 
 }  // namespace

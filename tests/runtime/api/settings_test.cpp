@@ -52,6 +52,24 @@ TEST(Settings, OfAnOlderCallerEndWhereItsStructEnds) {
   EXPECT_EQ(scene_of("b.h5", reinterpret_cast<const exmat_settings*>(bytes.data())).time_step, 0.25);
 }
 
+TEST(Settings, BeyondAllScalesAreRefused) {
+  for (double exmat_settings::*const member :
+       {&exmat_settings::time_step, &exmat_settings::example_stiffness, &exmat_settings::example_damping,
+        &exmat_settings::sleep_energy, &exmat_settings::sleep_time, &exmat_settings::space_release}) {
+    exmat_settings settings = default_settings();
+    settings.*member = 1e200;
+    EXPECT_THROW(scene_of("b.h5", &settings), InvalidArgument);
+  }
+  exmat_settings settings = default_settings();
+  settings.gravity[1] = -1e200;
+  try {
+    scene_of("b.h5", &settings);
+    ADD_FAILURE() << "taken";
+  } catch (const InvalidArgument& error) {
+    EXPECT_THAT(error.what(), HasSubstr("settings.gravity[1] = -1e+200: expected a finite number, of at most 1e+30"));
+  }
+}
+
 TEST(Settings, OfNoVersionAreRefused) {
   for (const std::size_t size : {std::size_t{0}, kSettingsSizes.first - 1, kMostStructBytes + 1}) {
     exmat_settings settings = default_settings();

@@ -88,6 +88,27 @@ def test_a_body_of_no_finite_numbers_is_as_it_was(bundle):
     assert batch.time == 0.001 and np.array_equal(batch.q[1], before)  # the step that the others have taken is the last
 
 
+def test_settings_beyond_all_scales_are_refused(bundle):
+    for name in ("time_step", "example_stiffness", "example_damping", "sleep_energy", "sleep_time", "space_release"):
+        with pytest.raises(exmat.InvalidArgument, match=rf"settings\.{name} = 1e\+200: expected a finite number, of at most 1e\+30"):
+            exmat.Model(bundle, **{name: 1e200})
+    with pytest.raises(exmat.InvalidArgument, match=r"settings\.gravity\[1\] = -1e\+155: expected a finite number, of at most 1e\+30"):
+        exmat.Model(bundle, gravity=(0, -1e155, 0))
+    for damping in ("mass_damping", "stiffness_damping"):
+        body = exmat.Body(exmat.Model(bundle, **{damping: 1e200}))
+        body.step()
+        assert np.isfinite(body.q).all() and np.isfinite(body.v).all()
+
+
+def test_a_body_beyond_single_precision_is_said(free_bundle):
+    """Positions in it were infinite after a step that was told as sound."""
+    model = exmat.Model(free_bundle, time_step=1e5, gravity=(0, 1e30, 0))
+    body = exmat.Body(model)
+    with pytest.raises(exmat.NonFinite):
+        body.step(2)
+    assert np.isfinite(body.positions(exmat.Points(model, [0]))).all()
+
+
 def test_steps_let_other_threads_run_and_refuse_the_same_body(model):
     body, other = exmat.Body(model), exmat.Body(model)
     done = threading.Event()
