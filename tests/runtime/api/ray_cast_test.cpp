@@ -28,9 +28,12 @@ class RayThroughAWorld : public ::testing::Test {
     const std::array bars{test::BarOptions{.free = true},
                           test::BarOptions{.cells = {3, 2, 2}, .lengths = {0.5, 0.4, 0.3}, .free = true}};
     for (std::size_t i = 0; i < bars.size(); ++i) {
-      write_bundle(test::make_bar(bars[i]).model, folder_ / names_[i]);
+      test::Bar bar = test::make_bar(bars[i]);
+      bar.model.contact = test::surface_contact(bar.model);
+      write_bundle(bar.model, folder_ / names_[i]);
       exmat_settings settings = exmat::default_settings();
       settings.space = i == 0 ? EXMAT_SPACE_REDUCED : EXMAT_SPACE_FULL;
+      settings.use_contact = 1;
       models_.emplace_back(folder_ / names_[i], settings);
       surfaces_.emplace_back(models_[i], EXMAT_SURFACE_OBJECT);
     }
