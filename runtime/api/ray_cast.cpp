@@ -1,23 +1,18 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cinttypes>
-#include <limits>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "exmat/exmat.h"
 #include "runtime/api/arguments.h"
 #include "runtime/api/world_handle.h"
+#include "runtime/sim/contact/ray.h"
 
 using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 
 namespace {
-
-struct Ray {
-  Eigen::Vector3d origin, direction;  ///< [m], unit
-};
 
 /// The first triangle that a ray meets; -1: none.
 struct Hit {
@@ -26,8 +21,7 @@ struct Hit {
   double distance = 0;  ///< [m]
 };
 
-/// Casts a ray through triangles whose corners are at `xyz` [3k], world [m], no farther than `most` [m]. Moeller and
-/// Trumbore 1997.
+/// Casts a ray through triangles whose corners are at `xyz` [3k], world [m], no farther than `most` [m].
 Hit first_hit(const TriangleArray& triangles, const std::vector<double>& xyz, const Ray& ray, double most) {
   const auto corner = [&](Eigen::Index triangle, int c) {
     return Eigen::Map<const Eigen::Vector3d>(xyz.data() + 3 * static_cast<Eigen::Index>(triangles(triangle, c)));
@@ -35,14 +29,10 @@ Hit first_hit(const TriangleArray& triangles, const std::vector<double>& xyz, co
   Hit first;
   first.distance = most;
   for (Eigen::Index k = 0; k < triangles.rows(); ++k) {
-    const Eigen::Vector3d a = corner(k, 0), ab = corner(k, 1) - a, ac = corner(k, 2) - a, from = ray.origin - a;
-    const Eigen::Vector3d across = ray.direction.cross(ac), over = from.cross(ab);
-    const double volume = ab.dot(across);
-    if (volume == 0) continue;
-    const double second = from.dot(across) / volume, third = ray.direction.dot(over) / volume;
-    const double distance = ac.dot(over) / volume;
-    if (second < 0 || third < 0 || second + third > 1 || distance < 0 || !(distance <= first.distance)) continue;
-    first = {k, {1 - second - third, second, third}, ab.cross(ac).normalized(), distance};
+    const Eigen::Vector3d a = corner(k, 0), b = corner(k, 1), c = corner(k, 2);
+    const std::optional<TriangleHit> hit = triangle_hit(ray, a, b, c);
+    if (hit && hit->distance <= first.distance)
+      first = {k, hit->shares, (b - a).cross(c - a).normalized(), hit->distance};
   }
   return first;
 }
@@ -78,21 +68,25 @@ std::optional<double> nearest_possible(const exmat_body& body, const exmat_surfa
   if (body.state.full) return 0;
   const Placement placement = body.model().frame->placement(body.state.frame);
   const Eigen::Matrix3d back = placement.rotation.transpose();
-  const Eigen::Vector3d origin = back * (ray.origin - placement.to_world(Eigen::Vector3d::Zero()));
-  const Eigen::Vector3d direction = back * ray.direction;
+  const Ray own{back * (ray.origin - placement.to_world(Eigen::Vector3d::Zero())), back * ray.direction};
   const Eigen::AlignedBox3d box = surface.box.at(body.state.q);
-  double enters = 0, leaves = std::numeric_limits<double>::infinity();
-  for (int axis = 0; axis < 3; ++axis) {
-    if (direction[axis] == 0) {
-      if (origin[axis] < box.min()[axis] || origin[axis] > box.max()[axis]) return std::nullopt;
-      continue;
-    }
-    const double low = (box.min()[axis] - origin[axis]) / direction[axis];
-    const double high = (box.max()[axis] - origin[axis]) / direction[axis];
-    enters = std::max(enters, std::min(low, high));
-    leaves = std::min(leaves, std::max(low, high));
+  return box_entry(own, box.min(), box.max());
+}
+
+/// Looks for an obstacle that the ray enters before `first`.
+void cast_through_obstacles(const exmat_world& world, const Ray& ray, exmat_ray_hit& first) {
+  for (const exmat_world::HostedObstacle& each : world.obstacles) {
+    const MotionSample pose = each.obstacle->motion.sample(time_of(world));
+    const Ray own{pose.to_frame(ray.origin), pose.rotation.transpose() * ray.direction};
+    const std::optional<double> distance = entry(each.obstacle->shape, own, first.distance);
+    if (!distance || *distance >= first.distance) continue;
+    first = {};
+    first.body = first.surface = first.triangle = -1;
+    first.distance = *distance;
+    Eigen::Map<Eigen::Vector3d>{first.normal} =
+        pose.rotation * nearest_surface_point(each.obstacle->shape, own.at(*distance)).normal;
+    first.obstacle = each.id;
   }
-  return enters <= leaves ? std::optional(enters) : std::nullopt;
 }
 
 }  // namespace
@@ -109,6 +103,8 @@ exmat_status exmat_body_cast_ray(const exmat_body* body, const exmat_surface* su
   if (surface->points.source != body->source)
     return fail(EXMAT_INVALID_ARGUMENT, "%s: the surface is that of another model", __func__);
   return guarded(__func__, [&] {
+    const std::optional<double> possible = nearest_possible(*body, *surface, ray);
+    if (!possible || *possible > most) return;
     std::vector<double> xyz;
     const Hit hit = first_hit(*body, *surface, ray, most, xyz);
     if (hit.triangle < 0) return;
@@ -145,7 +141,7 @@ exmat_status exmat_world_cast_ray(const exmat_world* world, const exmat_surface*
             candidates.push_back({*distance, &member, i});
     std::ranges::stable_sort(candidates, {}, &Candidate::distance);
     exmat_ray_hit first{};
-    first.body = first.surface = first.triangle = -1;
+    first.body = first.surface = first.triangle = first.obstacle = -1;
     first.distance = most;
     std::vector<double> xyz;
     for (const Candidate& candidate : candidates) {
@@ -159,7 +155,8 @@ exmat_status exmat_world_cast_ray(const exmat_world* world, const exmat_surface*
       std::copy_n(found.shares.data(), 3, first.shares);
       std::copy_n(found.normal.data(), 3, first.normal);
     }
-    if (first.body < 0) first.distance = 0;
+    if (hit->size > kRayHitSizes.first) cast_through_obstacles(*world, ray, first);
+    if (first.body < 0 && first.obstacle < 0) first.distance = 0;
     give(first, hit->size, hit);
   });
 }

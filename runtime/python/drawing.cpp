@@ -177,7 +177,7 @@ void bind_capacity(py::module_& module) {
 
 void bind_ray_hit(py::module_& module) {
   const auto array = [](const std::array<double, 3>& numbers) { return py::array_t<double>(3, numbers.data()); };
-  py::class_<RayHit>(module, "RayHit", "A point of a surface that a ray meets.")
+  py::class_<RayHit>(module, "RayHit", "A point of a surface, or of an obstacle, that a ray meets.")
       .def_readonly("triangle", &RayHit::triangle, "Its number in the surface.")
       .def_property_readonly(
           "shares", [array](const RayHit& hit) { return array(hit.shares); },
@@ -186,7 +186,9 @@ void bind_ray_hit(py::module_& module) {
       .def_property_readonly(
           "normal", [array](const RayHit& hit) { return array(hit.normal); }, "Outward, of length 1: shape (3,).")
       .def_readonly("body", &RayHit::body, "Of World.cast_ray(): the id of the body; else -1.")
-      .def_readonly("surface", &RayHit::surface, "Of World.cast_ray(): the place of its surface in the list; else 0.");
+      .def_readonly("surface", &RayHit::surface, "Of World.cast_ray(): the place of its surface in the list; else 0.")
+      .def_readonly("obstacle", &RayHit::obstacle,
+                    "Of World.cast_ray(): the id of the obstacle; else -1. Triangle, body and surface of one are -1.");
 }
 
 void bind_drawing(py::module_& module, BodyClass& body, WorldClass& world, BatchClass& batch) {
@@ -199,9 +201,9 @@ void bind_drawing(py::module_& module, BodyClass& body, WorldClass& world, Batch
   world.def(
       "cast_ray", &cast_ray_through, py::arg("surfaces"), py::arg("origin"), py::arg("direction"),
       py::arg("within") = std::numeric_limits<double>::infinity(),
-      "The first triangle of all bodies, as Body.cast_ray(); bodies have those surfaces of the list that are of "
-      "their model, others and obstacles are not seen. Bodies in their modes cost little where the ray misses the "
-      "box about all that these reach.");
+      "The first triangle of all bodies, as Body.cast_ray(), or the obstacle that the ray enters before; bodies have "
+      "those surfaces of the list that are of their model, others are not seen. Bodies in their modes cost little "
+      "where the ray misses the box about all that these reach.");
   body.def("positions", &surface_positions, py::arg("surface"), py::arg("out") = py::none(),
            "Those of the k points of a surface, likewise.")
       .def("energy_density", &energy_density, py::arg("surface"),

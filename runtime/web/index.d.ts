@@ -250,18 +250,32 @@ export interface Touch {
 }
 
 /** A place of a surface of a body that a ray meets. */
-export interface RayHit {
+export interface BodyHit extends Place {
   body: Body;
+  obstacle: null;
   surface: Surface;
   /** Number of the triangle in the surface. */
   triangle: number;
   /** Shares of its corners [3], sum 1, as Surface.pointsOn() and Hand take them. */
   shares: number[];
+}
+
+/** A place of an obstacle that a ray enters. */
+export interface ObstacleHit extends Place {
+  body: null;
+  /** Its id. */
+  obstacle: number;
+}
+
+interface Place {
   /** Distance from the origin of the ray [m]. */
   distance: number;
   /** Unit normal, outward [3]. */
   normal: number[];
 }
+
+/** The first place that a ray through a world meets: `hit.body` tells which of the two. */
+export type RayHit = BodyHit | ObstacleHit;
 
 /** Bodies that may touch each other, and obstacles. */
 export class World implements Owner {
@@ -274,7 +288,8 @@ export class World implements Owner {
   readonly touches: Touch[];
   /**
    * The first triangle of all bodies, as they are now, that a ray from `origin` [3] [m] along `direction` [3] meets
-   * within so many metres, from either side; null: none. Bodies have those of `surfaces` that are of their models.
+   * within so many metres, from either side, or the obstacle that it enters before; null: none. Bodies have those of
+   * `surfaces` that are of their models.
    */
   castRay(surfaces: readonly Surface[], origin: Numbers, direction: Numbers, options?: { within?: number }): RayHit | null;
   step(count?: number): this;

@@ -392,12 +392,14 @@ class WorldOfModule extends Owner {
       });
     });
   }
-  /** The first triangle of all bodies, by those of `surfaces` that are of their models, that a ray meets; null: none. */
+  /** The first triangle of all bodies, by those of `surfaces` that are of their models, or obstacle that a ray meets; null: none. */
   castRay(surfaces, origin, direction, { within = Infinity } = {}) {
     const { module } = this, ray = new Float64Array([...ofLength(origin, 3, "origin"), ...ofLength(direction, 3, "direction")]);
-    const { body, surface, triangle, shares, distance, normal } = module.lend(Uint32Array.from(surfaces, ({ handle }) => handle), (list) =>
+    const { body, surface, triangle, shares, distance, normal, obstacle } = module.lend(Uint32Array.from(surfaces, ({ handle }) => handle), (list) =>
       module.lend(ray, (address) => module.read("ray_hit", "world_cast_ray", this.handle, list, BigInt(surfaces.length), address, address + 24, within)));
-    return body < 0 ? null : { body: this.#ids.get(body), surface: surfaces[surface], triangle, shares, distance, normal };
+    if (body < 0 && obstacle < 0) return null;
+    const place = { distance, normal, obstacle: obstacle < 0 ? null : obstacle };
+    return body < 0 ? { body: null, ...place } : { body: this.#ids.get(body), surface: surfaces[surface], triangle, shares, ...place };
   }
   get time() { return this.module.exports.exmat_world_time(this.handle); }
   get energies() { return this.module.read("energies", "world_read_energies", this.handle); }

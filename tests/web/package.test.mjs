@@ -239,6 +239,10 @@ test("a ray through a world meets the first triangle of all bodies", async () =>
   }
   assert.ok(hits > 15);
   assert.equal(world.castRay([], [0, 0, 9], [0, 0, -1]), null);
+  const ball = world.addObstacle({ shape: "sphere", point: [50, 0, 0], radius: 2 });
+  const hit = world.castRay([surface], [50, 0, 9], [0, 0, -1]);
+  assert.deepEqual([hit.body, hit.obstacle], [null, ball]);
+  assert.ok(near([hit.distance, ...hit.normal], [7, 0, 0, 1], 1e-12));
   assert.throws(() => world.castRay([surface], [0, 0, 9], [0, 0, 0]), files.InvalidArgument);
   assert.throws(() => world.castRay([surface], [0, 9], [0, 0, 1]), files.InvalidArgument);
   world.free();

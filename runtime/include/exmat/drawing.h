@@ -69,26 +69,30 @@ EXMAT_API exmat_status exmat_points_create_on_surface(const exmat_surface* surfa
 /* The first triangle of the surface of a body, as it is now, that a ray from `origin` [3] [m] along `direction` [3], of
    any length but 0, meets within `most` [m], from either side: its number, -1 where there is none; the `shares` [3] of
    its corners, as exmat_points_create_on_surface() takes them; the `distance` from the origin [m]; and the unit
-   `normal` [3], outward. All but `triangle` may be NULL. It takes the time of exmat_body_read_positions_double(), and
-   allocates. */
+   `normal` [3], outward. All but `triangle` may be NULL. It takes the time of exmat_body_read_positions_double(), r
+   operations where the ray misses the box about all that the modes of the body reach, and allocates. */
 EXMAT_API exmat_status exmat_body_cast_ray(const exmat_body* body, const exmat_surface* surface, const double* origin,
                                            const double* direction, double most, int64_t* triangle, double* shares,
                                            double* distance, double* normal) EXMAT_NOEXCEPT;
 
-/* A place of a surface of a body that a ray meets. */
+/* The place that a ray through a world meets: of a surface of a body, or of an obstacle. */
 typedef struct exmat_ray_hit {
   size_t size;      /* sizeof(exmat_ray_hit), set by the caller */
-  int64_t body;     /* its id in the world; -1: the ray meets nothing, and nothing else is told */
-  int64_t surface;  /* the number of its surface among those that were given */
-  int64_t triangle; /* of that surface */
+  int64_t body;     /* its id in the world; -1 of an obstacle, and where the ray meets nothing */
+  int64_t surface;  /* of a body: the number of its surface among those that were given; else -1 */
+  int64_t triangle; /* of that surface; -1 of an obstacle */
   double shares[3]; /* of the triangle's corners, sum 1, as exmat_points_create_on_surface() takes them */
   double distance;  /* from the origin of the ray [m] */
   double normal[3]; /* unit, outward */
+  int64_t
+      obstacle; /* its id in the world; -1 of a body. -1 as `body` is: the ray meets nothing, nothing else is told */
 } exmat_ray_hit;
 
-/* The first triangle of all bodies of the world, as they are now, that a ray meets, as exmat_body_cast_ray(). Bodies
-   have those of `surfaces` [count] that are of their model; others, and obstacles, are not seen. A body in its modes
-   takes r operations where the ray misses the box about all that its modes reach, or something is nearer. Allocates. */
+/* The first triangle of all bodies of the world, as they are now, that a ray meets, as exmat_body_cast_ray(), or the
+   obstacle that it enters before. Bodies have those of `surfaces` [count] that are of their model, and others are not
+   seen; with no surface obstacles alone are. Obstacles are solid, meshes with a thickness by that much: one that the
+   ray begins in is not seen. A body in its modes takes r operations where the ray misses the box about all that its
+   modes reach, or something is nearer. Allocates. */
 EXMAT_API exmat_status exmat_world_cast_ray(const exmat_world* world, const exmat_surface* const* surfaces,
                                             int64_t count, const double* origin, const double* direction, double most,
                                             exmat_ray_hit* hit) EXMAT_NOEXCEPT;

@@ -98,7 +98,7 @@ struct Elasticity {
   std::vector<double> force, tangent;
 };
 
-/// A point of a surface that a ray meets.
+/// A point of a surface, or of an obstacle, that a ray meets.
 struct RayHit {
   std::int64_t triangle = -1;
   std::array<double, 3> shares{};  ///< of its corners, sum 1, as Points::on_surface() takes them
@@ -106,6 +106,7 @@ struct RayHit {
   std::array<double, 3> normal{};  ///< outward, of length 1
   std::int64_t body = -1;          ///< of a ray through a world: the id of the body that it meets
   std::int64_t surface = 0;        ///< likewise: the number of its surface among those that were given
+  std::int64_t obstacle = -1;      ///< likewise: the id of the obstacle, of which triangle, body and surface are -1
 };
 
 /// A square sparse matrix: row i has the entries from starts[i] to starts[i + 1], their columns ascending.

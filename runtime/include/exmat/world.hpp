@@ -74,7 +74,7 @@ class WorldRef {
     return touches;
   }
   /// The first triangle of all bodies that a ray from `origin` [m] along `direction` meets within `most` [m], from
-  /// either side. Bodies have those of `surfaces` that are of their model.
+  /// either side, or the obstacle that it enters before. Bodies have those of `surfaces` that are of their model.
   std::optional<RayHit> cast_ray(std::span<const Surface* const> surfaces, std::span<const double, 3> origin,
                                  std::span<const double, 3> direction,
                                  double most = std::numeric_limits<double>::infinity()) const {
@@ -84,9 +84,10 @@ class WorldRef {
     hit.size = sizeof hit;
     const auto count = static_cast<std::int64_t>(handles.size());
     check(exmat_world_cast_ray(get(), handles.data(), count, origin.data(), direction.data(), most, &hit));
-    if (hit.body < 0) return std::nullopt;
-    return RayHit{hit.triangle, std::to_array(hit.shares), hit.distance, std::to_array(hit.normal), hit.body,
-                  hit.surface};
+    if (hit.body < 0 && hit.obstacle < 0) return std::nullopt;
+    return RayHit{
+        hit.triangle, std::to_array(hit.shares), hit.distance, std::to_array(hit.normal), hit.body, hit.surface,
+        hit.obstacle};
   }
   exmat_energies energies() const {
     exmat_energies energies;

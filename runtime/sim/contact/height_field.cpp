@@ -195,4 +195,39 @@ bool HeightField::may_be_within(const Eigen::Vector3d& point, double radius) con
   return radius >= 0 && search<Search::kAny>(point, radius).triangle >= 0;
 }
 
+std::optional<double> HeightField::entry(const Ray& ray, double most) const noexcept {
+  struct Waiting {
+    int level, column, row;
+  };
+  Waiting waiting[128];  // three of each of at most 31 levels, and four
+  int count = 0;
+  std::optional<double> first;
+  waiting[count++] = {static_cast<int>(levels_.size()) - 1, 0, 0};
+  while (count > 0) {
+    const Waiting block = waiting[--count];
+    const Level& blocks = levels_[static_cast<std::size_t>(block.level)];
+    const auto at = static_cast<std::size_t>(block.row) * static_cast<std::size_t>(blocks.columns) +
+                    static_cast<std::size_t>(block.column);
+    const double wide = static_cast<double>(1 << block.level) * spacing_[0];
+    const double deep = static_cast<double>(1 << block.level) * spacing_[1];
+    const auto bound = box_entry(
+        ray, {block.column * wide, block.row * deep, blocks.lowest[at]},
+        {std::min((block.column + 1) * wide, width_), std::min((block.row + 1) * deep, depth_), blocks.highest[at]});
+    if (!bound || *bound > most) continue;
+    if (block.level == 0) {
+      for (const int triangle : {2 * static_cast<int>(at), 2 * static_cast<int>(at) + 1}) {
+        const auto [a, b, c] = corners(triangle);
+        const auto hit = triangle_hit(ray, a, b, c);
+        if (hit && hit->distance <= most && normal_of(triangle).dot(ray.direction) < 0) first = most = hit->distance;
+      }
+      continue;
+    }
+    const Level& fine = levels_[static_cast<std::size_t>(block.level) - 1];
+    for (int y = 2 * block.row; y < std::min(2 * block.row + 2, fine.rows); ++y)
+      for (int x = 2 * block.column; x < std::min(2 * block.column + 2, fine.columns); ++x)
+        waiting[count++] = {block.level - 1, x, y};
+  }
+  return first;
+}
+
 }  // namespace exmat::runtime

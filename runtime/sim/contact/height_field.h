@@ -3,10 +3,12 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "common/core/arrays.h"
 #include "runtime/sim/contact/nearest_on_triangle.h"
+#include "runtime/sim/contact/ray.h"
 #include "runtime/sim/contact/surface_point.h"
 
 namespace exmat::runtime {
@@ -33,6 +35,9 @@ class HeightField {
 
   /// False only where the signed distance is above `radius`.
   bool may_be_within(const Eigen::Vector3d& point, double radius) const noexcept;
+
+  /// Distance within `most` at which a ray from above meets the surface [m].
+  std::optional<double> entry(const Ray& ray, double most) const noexcept;
 
   /// Height of the surface; beyond the border that of its nearest point.
   double height_at(double x, double y) const noexcept;

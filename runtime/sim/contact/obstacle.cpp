@@ -81,6 +81,32 @@ bool is_within(const Solid& shape, const Eigen::Vector3d& point, double radius) 
   return nearest(shape, point, hint).distance <= radius;
 }
 
+/// The ray begins outside.
+std::optional<double> entry_of(const Plane& plane, const Ray& ray, double /*most*/) {
+  const double nears = -plane.normal.dot(ray.direction);
+  return nears > 0 ? std::optional(plane.distance(ray.origin) / nears) : std::nullopt;
+}
+std::optional<double> entry_of(const Sphere& sphere, const Ray& ray, double /*most*/) {
+  return ball_entry(ray, sphere.centre, sphere.radius);
+}
+std::optional<double> entry_of(const Capsule& capsule, const Ray& ray, double /*most*/) {
+  return capsule_entry(ray, capsule.start, capsule.end, capsule.radius);
+}
+std::optional<double> entry_of(const Box& box, const Ray& ray, double /*most*/) {
+  const Ray own{box.rotation.transpose() * (ray.origin - box.centre), box.rotation.transpose() * ray.direction};
+  return box_entry(own, -box.half_extents, box.half_extents);
+}
+template <class Placed>
+Ray in_axes_of(const Placed& shape, const Ray& ray) {
+  return {in_axes_of(shape, ray.origin), shape.rotation.transpose() * ray.direction};
+}
+std::optional<double> entry_of(const MeshShape& shape, const Ray& ray, double most) {
+  return shape.mesh->entry(in_axes_of(shape, ray), most);
+}
+std::optional<double> entry_of(const HeightFieldShape& shape, const Ray& ray, double most) {
+  return shape.field->entry(in_axes_of(shape, ray), most);
+}
+
 double deepest_in(const Plane& /*plane*/) { return std::numeric_limits<double>::infinity(); }
 double deepest_in(const Sphere& sphere) { return sphere.radius; }
 double deepest_in(const Box& box) { return box.half_extents.minCoeff(); }
@@ -109,6 +135,12 @@ double signed_distance(const Shape& shape, const Eigen::Vector3d& point) noexcep
 
 bool may_be_within(const Shape& shape, const Eigen::Vector3d& point, double radius) noexcept {
   return std::visit([&](const auto& held) { return is_within(held, point, radius); }, shape);
+}
+
+std::optional<double> entry(const Shape& shape, const Ray& ray, double most) noexcept {
+  if (signed_distance(shape, ray.origin) < 0) return std::nullopt;
+  const auto distance = std::visit([&](const auto& held) { return entry_of(held, ray, most); }, shape);
+  return distance && *distance <= most ? distance : std::nullopt;
 }
 
 double deepest(const Shape& shape) noexcept {

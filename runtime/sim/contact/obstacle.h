@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <variant>
 #include <vector>
@@ -59,6 +60,9 @@ double signed_distance(const Shape& shape, const Eigen::Vector3d& point) noexcep
 
 /// False only where it is above `radius`.
 bool may_be_within(const Shape& shape, const Eigen::Vector3d& point, double radius) noexcept;
+
+/// Distance within `most` at which a ray enters the solid [m]; none where it begins in it.
+std::optional<double> entry(const Shape& shape, const Ray& ray, double most) noexcept;
 
 /// Largest distance of a point inside from the surface; infinite for half spaces and ground [m].
 double deepest(const Shape& shape) noexcept;

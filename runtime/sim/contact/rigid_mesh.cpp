@@ -241,4 +241,42 @@ bool RigidMesh::may_be_within(const Eigen::Vector3d& point, double radius) const
   return nearest(point).distance <= radius;
 }
 
+/// Of a shell by its sides and by capsules about the edges.
+std::optional<double> RigidMesh::entry_of(const Face& face, const Ray& ray) const noexcept {
+  const auto& [a, b, c] = face.corners;
+  const double facing = face.normal.dot(ray.direction), half = 0.5 * thickness_;
+  std::optional<double> first;
+  if (facing < 0 || (facing > 0 && half > 0)) {
+    const Eigen::Vector3d shift = (facing < 0 ? half : -half) * face.normal;
+    if (const auto hit = triangle_hit(ray, a + shift, b + shift, c + shift)) first = hit->distance;
+  }
+  if (half == 0) return first;
+  for (std::size_t i = 0; i < 3; ++i)
+    first = nearer(first, capsule_entry(ray, face.corners[i], face.corners[(i + 1) % 3], half));
+  return first;
+}
+
+std::optional<double> RigidMesh::entry(const Ray& ray, double most) const noexcept {
+  int waiting[64];  // halves of a tree of at most 2^32 leaves
+  int count = 0;
+  std::optional<double> first;
+  waiting[count++] = 0;
+  while (count > 0) {
+    const int index = waiting[--count];
+    const Node& node = nodes_[static_cast<std::size_t>(index)];
+    const auto bound =
+        box_entry(ray, node.box.low.array() - 0.5 * thickness_, node.box.high.array() + 0.5 * thickness_);
+    if (!bound || *bound > most) continue;
+    if (node.right > 0) {
+      waiting[count++] = node.right;
+      waiting[count++] = index + 1;
+      continue;
+    }
+    for (int face = node.first; face < node.last; ++face)
+      if (const auto here = entry_of(faces_[static_cast<std::size_t>(face)], ray); here && *here <= most)
+        first = most = *here;
+  }
+  return first;
+}
+
 }  // namespace exmat::runtime

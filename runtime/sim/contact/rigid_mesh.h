@@ -2,10 +2,12 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "common/core/arrays.h"
 #include "runtime/sim/contact/nearest_on_triangle.h"
+#include "runtime/sim/contact/ray.h"
 #include "runtime/sim/contact/surface_point.h"
 
 namespace exmat::runtime {
@@ -36,6 +38,9 @@ class RigidMesh {
   /// False only where the signed distance is above `radius`.
   bool may_be_within(const Eigen::Vector3d& point, double radius) const noexcept;
 
+  /// Distance within `most` at which a ray that begins outside enters the solid [m].
+  std::optional<double> entry(const Ray& ray, double most) const noexcept;
+
  private:
   struct Face {
     std::array<Eigen::Vector3d, 3> corners;
@@ -63,6 +68,7 @@ class RigidMesh {
   void set_normals(const VertexArray& vertices, const TriangleArray& triangles, const std::vector<int>& order);
   void sample_cells();
   TrianglePoint nearest_on(int face, const Eigen::Vector3d& point) const noexcept;
+  std::optional<double> entry_of(const Face& face, const Ray& ray) const noexcept;
   enum class Search { kNearest, kTwoNearest, kAny };
   template <Search kSearch>
   Found search(const Eigen::Vector3d& point, double reach) const noexcept;

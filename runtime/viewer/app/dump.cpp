@@ -42,6 +42,8 @@ void dump(const Snapshot& snapshot, const Studio& studio, const PictureSize& pic
                              {"point", numbers(grip.point)},
                              {"target", numbers(grip.target)},
                              {"force", numbers(grip.force)}});
+  json["pins"] = OrderedJson::array();
+  for (const Eigen::Vector3d& pin : snapshot.pins) json["pins"].push_back(numbers(pin));
   const LostWork& lost = studio.lost_work();
   if (lost.hand) json["lost_work"]["hand"] = *lost.hand;
   if (lost.contact) json["lost_work"]["contact"] = *lost.contact;

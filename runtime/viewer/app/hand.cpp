@@ -18,7 +18,11 @@ Eigen::Vector2d pixel_of(const ImVec2& mouse) { return {mouse.x - 0.5, mouse.y -
 void Hand::act(Studio& studio, const PictureSize& picture, std::span<const int> keys) {
   use_mouse(studio, picture);
   if (ImGui::GetIO().WantTextInput) return;
-  for (const int key : keys) use_key(studio, key);
+  for (const int key : keys)
+    if (key == GLFW_KEY_P)
+      studio.toggle_pin(pixel_of(ImGui::GetIO().MousePos), picture);
+    else
+      use_key(studio, key);
 }
 
 void Hand::use_mouse(Studio& studio, const PictureSize& picture) {

@@ -38,6 +38,16 @@ void draw_grips(const Style& style, const Snapshot& snapshot, Studio& studio, co
   }
 }
 
+void draw_pins(const Style& style, const Snapshot& snapshot, const Studio& studio, const PictureSize& picture,
+               ImDrawList& list) {
+  for (const Eigen::Vector3d& pin : snapshot.pins) {
+    const auto point = studio.camera().pixel(pin, picture);
+    if (!point) continue;
+    list.AddCircleFilled(at(*point), 7 * style.scale, IM_COL32(255, 255, 255, 220));
+    list.AddCircleFilled(at(*point), 5 * style.scale, IM_COL32(0, 158, 115, 255));
+  }
+}
+
 void draw_bones(const Style& style, const Snapshot& snapshot, const Studio& studio, const PictureSize& picture,
                 ImDrawList& list) {
   const float s = style.scale;
@@ -98,16 +108,18 @@ void draw_overlay(const Style& style, const Snapshot& snapshot, const SceneDrawi
                   const PictureSize& picture) {
   ImDrawList& list = *ImGui::GetBackgroundDrawList();
   if (studio.look().bones) draw_bones(style, snapshot, studio, picture, list);
+  draw_pins(style, snapshot, studio, picture, list);
   draw_grips(style, snapshot, studio, picture, list);
   draw_names(style, drawing, studio, picture, list);
   if (studio.interface) draw_scale(style, drawing.most(), studio.look().colouring, picture, list);
 }
 
 void draw_help(const Style& style) {
-  constexpr std::array<std::pair<const char*, const char*>, 21> kKeys{
+  constexpr std::array<std::pair<const char*, const char*>, 22> kKeys{
       {{"drag a body", "pull at it; let go to throw it"},
        {"drag an obstacle", "push with it"},
        {"drag a joint", "turn the bone that it hangs on; a root is shifted"},
+       {"P over a body", "pin it there; again lets it go"},
        {"drag elsewhere", "look from another side"},
        {"right or middle button", "move the picture"},
        {"wheel", "nearer, farther"},

@@ -101,6 +101,7 @@ void ScriptPlayer::check() const {
       if (studio_.shapes()[studio_.kinds_of_bodies()[what["throw"].value("body", std::size_t{0})]]->mass == 0)
         throw InputError({file, action.place + "/throw", "a free body", "one with fixed vertices", ""});
     }
+    if (what.contains("pin")) require_body(what["pin"], action.place + "/pin");
     if (what.contains("reset") && what["reset"].get<bool>()) hands.clear();
   }
 }
@@ -135,6 +136,8 @@ void ScriptPlayer::act(const Script::Action& action) {
     studio_.runner().with([&](Simulation& simulation) { simulation.release(hand->second.grip); });
     hands_.erase(hand);
   }
+  if (what.contains("pin"))
+    studio_.toggle_pin_near(what["pin"].value("body", std::size_t{0}), vector_of(what["pin"]["point"]));
   if (what.contains("throw")) {
     const Json& thrown = what["throw"];
     const Eigen::Vector3d spin = thrown.contains("spin") ? vector_of(thrown["spin"]) : Eigen::Vector3d::Zero();

@@ -6,6 +6,7 @@
 
 #include "exmat/exmat.hpp"
 #include "runtime/viewer/view/camera.h"
+#include "runtime/viewer/view/picking.h"
 
 namespace exmat::viewer {
 
@@ -32,6 +33,17 @@ struct BodyShape {
   double mass = 0;                         ///< mass of a free body [kg]; 0 with fixed vertices
 
   bool on_bones() const { return !bones.empty(); }
+  std::int32_t point(std::int64_t triangle, int corner) const {
+    return triangles[static_cast<std::size_t>(3 * triangle + corner)];
+  }
+  Eigen::Vector3d rest_corner(std::int64_t triangle, int corner) const {
+    return Eigen::Map<const Eigen::Vector3d>(rest.data() + 3 * static_cast<std::ptrdiff_t>(point(triangle, corner)));
+  }
+  Eigen::Vector3d rest_place(const SurfaceHit& place) const {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (int c = 0; c < 3; ++c) sum += place.shares[c] * rest_corner(place.triangle, c);
+    return sum;
+  }
 };
 
 /// Shape of a model's bodies, from its surface.

@@ -23,31 +23,30 @@ Points point_on(const Surface& surface, const SurfaceHit& place) {
   return Points::on_surface(surface, triangle, shares);
 }
 
-/// Those points of the surface that the hand covers, each a corner of a triangle; the picked one where it covers none.
-Points patch_of(const Surface& surface, const BodyShape& shape, const SurfaceHit& place) {
-  const auto rest = [&](std::int32_t point) {
-    return Eigen::Map<const Eigen::Vector3d>(shape.rest.data() + 3 * static_cast<std::ptrdiff_t>(point));
-  };
-  const auto corner = [&](std::int64_t triangle, int c) {
-    return shape.triangles[static_cast<std::size_t>(3 * triangle + c)];
-  };
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  for (int c = 0; c < 3; ++c) centre += place.shares[c] * rest(corner(place.triangle, c));
+}  // namespace
+
+std::vector<Corner> covered_points(const BodyShape& shape, const SurfaceHit& place) {
+  const Eigen::Vector3d centre = shape.rest_place(place);
   const double radius = kHandSize * shape.bounds.diagonal();
   std::set<std::int32_t> covered;
+  std::vector<Corner> corners;
+  for (std::int64_t triangle = 0; triangle < std::ssize(shape.triangles) / 3; ++triangle)
+    for (int c = 0; c < 3; ++c)
+      if ((shape.rest_corner(triangle, c) - centre).norm() <= radius && covered.insert(shape.point(triangle, c)).second)
+        corners.push_back({triangle, c});
+  return corners;
+}
+
+Points patch_of(const Surface& surface, const BodyShape& shape, const SurfaceHit& place) {
   std::vector<std::int64_t> triangles;
   std::vector<double> shares;
-  for (std::int64_t triangle = 0; triangle < std::ssize(shape.triangles) / 3; ++triangle)
-    for (int c = 0; c < 3; ++c) {
-      if ((rest(corner(triangle, c)) - centre).norm() > radius || !covered.insert(corner(triangle, c)).second) continue;
-      triangles.push_back(triangle);
-      for (int other = 0; other < 3; ++other) shares.push_back(other == c ? 1 : 0);
-    }
+  for (const Corner& covered : covered_points(shape, place)) {
+    triangles.push_back(covered.triangle);
+    for (int c = 0; c < 3; ++c) shares.push_back(c == covered.corner ? 1 : 0);
+  }
   return triangles.empty() ? point_on(surface, place) : Points::on_surface(surface, triangles, shares);
 }
 
-/// The inverse of how much an impulse on the points, shared by them, moves their mean, by the modes and by rigid
-/// motion.
 double effective_mass(const Points& points, const BodyShape& shape) {
   const std::vector<float> rows = points.basis(shape.modes);
   std::vector<double> mean(3 * shape.modes);
@@ -56,8 +55,6 @@ double effective_mass(const Points& points, const BodyShape& shape) {
   if (shape.mass > 0) inverse += 3 / shape.mass;
   return inverse > 0 ? 1 / inverse : 0;
 }
-
-}  // namespace
 
 Grip::Grip(int id, std::size_t body, const BodyShape& shape, const Surface& surface, const SurfaceHit& place,
            BodyRef& held)

@@ -13,6 +13,23 @@ namespace exmat::viewer {
 /// Radius of a hand over the body's size.
 inline constexpr double kHandSize = 0.06;
 
+/// A corner of a triangle of a surface.
+struct Corner {
+  std::int64_t triangle = 0;
+  int corner = 0;
+};
+
+/// The points of the surface that a hand covers which takes it at `place`, each once; none where the mesh is too
+/// coarse.
+std::vector<Corner> covered_points(const BodyShape& shape, const SurfaceHit& place);
+
+/// Points for a hand or a pin: those that it covers, or the picked one alone.
+Points patch_of(const Surface& surface, const BodyShape& shape, const SurfaceHit& place);
+
+/// The inverse of how much an impulse on the points, shared by them, moves their mean, by the modes and by rigid motion
+/// [kg].
+double effective_mass(const Points& points, const BodyShape& shape);
+
 /// A damped spring from a point of a body's surface to where a hand is.
 class Grip {
  public:

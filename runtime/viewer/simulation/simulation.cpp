@@ -1,9 +1,12 @@
 #include "runtime/viewer/simulation/simulation.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <map>
+#include <optional>
+#include <span>
 
 namespace exmat::viewer {
 namespace {
@@ -166,7 +169,10 @@ void Simulation::apply_live(std::size_t kind, const Settings& settings) {
     BodyRef& body = bodies_[i];
     body.set_gravity(settings.gravity);
     body.set_damping(settings.mass_damping, settings.stiffness_damping);
-    if (settings.space != before.space) body.set_space(space_of(settings.space));
+    if (settings.space != before.space) {
+      remove_pins();
+      body.set_space(space_of(settings.space));
+    }
     if (settings.integrator != before.integrator) body.set_integrator(integrator_of(settings.integrator));
     std::int64_t region = -1;
     for (const ForceSettings& force : settings.forces) {
@@ -212,6 +218,7 @@ void Simulation::rebuild(std::size_t kind, const Settings& settings) {
   const bool goes_on = std::ranges::none_of(documents, &SceneDocument::has_scripted_motion);
   grips_.clear();
   joint_hands_.clear();
+  pins_.clear();
   documents_ = std::move(documents);
   take(std::move(made));
   steps_ = 0;
@@ -231,6 +238,7 @@ void Simulation::rebuild(std::size_t kind, const Settings& settings) {
 
 void Simulation::reset() {
   if (moved_bones_) rebuild(0, Settings(kinds_.front().settings));  // bones that a host gives end an animation
+  remove_pins();
   bodies_.world().reset();
   grips_.clear();
   joint_hands_.clear();
@@ -347,6 +355,56 @@ void Simulation::release(int id) {
   bodies_[body].restart_integrator();
 }
 
+void Simulation::toggle_pin(std::size_t body, const SurfaceHit& place) {
+  const BodyShape& shape = *kinds_[slots_[body].kind].shape;
+  const Eigen::Vector3d rest = shape.rest_place(place);
+  const auto held = std::ranges::find_if(pins_, [&](const Pin& pin) {
+    return pin.body == body && (pin.rest - rest).norm() <= kHandSize * shape.bounds.diagonal();
+  });
+  if (held != pins_.end()) {
+    bodies_[body].detach(held->attachment);
+    pins_.erase(held);
+    return;
+  }
+  std::vector<std::int64_t> vertices;
+  const auto take = [&](std::int64_t triangle, int corner) {
+    const std::int64_t vertex = shape.vertices[static_cast<std::size_t>(shape.point(triangle, corner))];
+    if (std::ranges::count(vertices, vertex) == 0) vertices.push_back(vertex);
+  };
+  for (const Corner& covered : covered_points(shape, place)) take(covered.triangle, covered.corner);
+  for (int c = 0; vertices.empty() && c < 3; ++c) take(place.triangle, c);
+
+  const std::vector<float> now = positions(body);
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();
+  for (int c = 0; c < 3; ++c)
+    point += place.shares[c] * Eigen::Map<const Eigen::Vector3f>(
+                                   now.data() + 3 * static_cast<std::ptrdiff_t>(shape.point(place.triangle, c)))
+                                   .cast<double>();
+  // A body in its modes may be too stiff for the first, and one that may touch others takes the last alone.
+  exmat_attachment kind = default_attachment();
+  const double mass = effective_mass(patch_of(*kinds_[slots_[body].kind].surface, shape, place), shape);
+  const double per_mass = std::min(1e5, 1 / (time_step() * time_step()));
+  kind.stiffness = per_mass * mass;
+  kind.damping = 2 * std::sqrt(per_mass) * mass;
+  constexpr std::array<double, 12> kWorld{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};
+  std::optional<std::int64_t> id;
+  for (const std::int32_t each : {EXMAT_ATTACHMENT_FIXED, EXMAT_ATTACHMENT_BALL, EXMAT_ATTACHMENT_SPRING}) {
+    kind.kind = each;
+    try {
+      id = bodies_[body].attach(vertices, kWorld, kind);
+      break;
+    } catch (const Error&) {
+      if (each == EXMAT_ATTACHMENT_SPRING) throw;
+    }
+  }
+  pins_.push_back({body, *id, rest, point});
+}
+
+void Simulation::remove_pins() {
+  for (const Pin& pin : pins_) bodies_[pin.body].detach(pin.attachment);
+  pins_.clear();
+}
+
 bool Simulation::throw_body(std::size_t body, const Eigen::Vector3d& velocity, const Eigen::Vector3d& spin) {
   if (kinds_[slots_[body].kind].shape->mass == 0) return false;
   exmat_motion motion = bodies_[body].motion();
@@ -356,6 +414,29 @@ bool Simulation::throw_body(std::size_t body, const Eigen::Vector3d& velocity, c
   }
   bodies_[body].set_motion(motion);
   return true;
+}
+
+std::optional<SurfaceHit> Simulation::cast(std::size_t body, const Ray& ray, double most) const {
+  const auto hit =
+      bodies_[body].cast_ray(*kinds_[slots_[body].kind].surface, std::span<const double, 3>(ray.origin.data(), 3),
+                             std::span<const double, 3>(ray.direction.data(), 3), most);
+  if (!hit) return std::nullopt;
+  return SurfaceHit{hit->triangle, Eigen::Vector3d(hit->shares.data()), hit->distance};
+}
+
+std::optional<Simulation::ObstacleHit> Simulation::cast(Ray ray) const {
+  constexpr double kBeyond = 1e-9;  // of the way to a plane, which does not hide what is behind it
+  double way = 0;
+  while (const auto hit = bodies_.world().cast_ray({}, std::span<const double, 3>(ray.origin.data(), 3),
+                                                   std::span<const double, 3>(ray.direction.data(), 3))) {
+    const auto found = std::ranges::find(obstacles_, hit->obstacle, &MovedObstacle::id);
+    if (bodies_.world().obstacle(hit->obstacle).shape != EXMAT_PLANE)
+      return ObstacleHit{static_cast<std::size_t>(found - obstacles_.begin()), way + hit->distance};
+    const double on = hit->distance + kBeyond * (1 + way + hit->distance);
+    way += on;
+    ray.origin += on * ray.direction;
+  }
+  return std::nullopt;
 }
 
 void Simulation::add_obstacle(const exmat_obstacle& obstacle) {

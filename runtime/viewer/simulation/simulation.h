@@ -60,6 +60,9 @@ class Simulation {
   void release(int id);
   void set_strength(double strength) { strength_ = strength; }
   double strength() const { return strength_; }
+  /// Holds the surface about `place` by an attachment where it is now, or lets that go which holds it there. Throws
+  /// exmat::Error where the body cannot be held.
+  void toggle_pin(std::size_t body, const SurfaceHit& place);
   /// Throws a free body; false where it is none.
   bool throw_body(std::size_t body, const Eigen::Vector3d& velocity, const Eigen::Vector3d& spin);
 
@@ -70,6 +73,15 @@ class Simulation {
   void move_obstacle(std::size_t obstacle, const Eigen::Vector3d& position);
   void set_obstacle_law(std::size_t obstacle, double stiffness, double damping, double friction);
   std::size_t obstacles() const { return obstacles_.size(); }
+
+  /// The place of a body's surface that the ray meets first within `most` [m]. The ray is without the body's offset.
+  std::optional<SurfaceHit> cast(std::size_t body, const Ray& ray, double most) const;
+  /// The first obstacle but planes that the ray enters.
+  struct ObstacleHit {
+    std::size_t number = 0;
+    double distance = 0;  ///< [m]
+  };
+  std::optional<ObstacleHit> cast(Ray ray) const;
 
   /// Surface positions [3k] now, world, without the offset.
   std::vector<float> positions(std::size_t body);
@@ -97,6 +109,12 @@ class Simulation {
     std::size_t kind = 0;
     Eigen::Vector3d offset = Eigen::Vector3d::Zero();
   };
+  /// An attachment of the user.
+  struct Pin {
+    std::size_t body = 0;
+    std::int64_t attachment = 0;
+    Eigen::Vector3d rest, point;  ///< its place at rest, and in the world without the body's offset [m]
+  };
   struct MovedObstacle {
     std::int64_t id = 0;
     std::int64_t of_scene = -1;  ///< its number there
@@ -123,6 +141,7 @@ class Simulation {
   void move_bones();
   bool step(std::int64_t steps);
   void add_times(std::int64_t steps, double seconds);
+  void remove_pins();
   void put(const Settings& settings, const Kind& kind, std::vector<SceneDocument>& documents) const;
   std::vector<std::size_t> most_touched() const;
   BodySnapshot body_snapshot(std::size_t body, const SnapshotRequest& request);
@@ -136,6 +155,7 @@ class Simulation {
   std::vector<MovedObstacle> obstacles_;
   std::vector<Grip> grips_;
   std::vector<JointHand> joint_hands_;
+  std::vector<Pin> pins_;
   bool moved_bones_ = false;  ///< true once a hand has held a joint of this world
   int next_grip_ = 1;
   double strength_ = 1;

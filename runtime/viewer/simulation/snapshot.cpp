@@ -106,6 +106,7 @@ Snapshot Simulation::snapshot(const SnapshotRequest& request) {
     snapshot.grips.push_back({hand.id, hand.body, snapshot.bodies[hand.body].joint(hand.joint) + offset,
                               hand.target + offset, Eigen::Vector3d::Zero()});
   }
+  for (const Pin& pin : pins_) snapshot.pins.push_back(pin.point + slots_[pin.body].offset);
   for (const MovedObstacle& moved : obstacles_)
     snapshot.obstacles.push_back(
         {moved.id, bodies_.world().obstacle(moved.id), bodies_.world().obstacle_motion(moved.id), moved.corners});

@@ -83,6 +83,7 @@ struct Snapshot {
   bool paused = false;
   std::vector<BodySnapshot> bodies;
   std::vector<GripSnapshot> grips;
+  std::vector<Eigen::Vector3d> pins;  ///< in the world, with the bodies' offsets [m]
   std::vector<ObstacleSnapshot> obstacles;
   StepTimes times;
   std::string failure;  ///< why the last step was not taken; else empty

@@ -82,19 +82,13 @@ std::optional<Pick> Studio::pick(const Eigen::Vector2d& pixel, const PictureSize
     double distance = 1e300;
     for (std::size_t body = 0; body < simulation.bodies(); ++body) {
       const Ray own{ray.origin - offsets_[body], ray.direction};
-      const std::optional<SurfaceHit> hit =
-          first_hit(own, simulation.positions(body), shapes_[kinds_[body]]->triangles);
+      const std::optional<SurfaceHit> hit = simulation.cast(body, own, distance);
       if (!hit || hit->distance >= distance) continue;
       distance = hit->distance;
       nearest = Pick{Pick::What::kBody, body, 0, *hit, ray.at(distance)};
     }
-    for (std::size_t i = 0; i < snapshot.obstacles.size(); ++i) {
-      const ObstacleSnapshot& obstacle = snapshot.obstacles[i];
-      const auto hit = obstacle_hit(ray, obstacle.obstacle, *obstacle.corners, obstacle.motion);
-      if (!hit || *hit >= distance) continue;
-      distance = *hit;
-      nearest = Pick{Pick::What::kObstacle, i, 0, {}, ray.at(distance)};
-    }
+    if (const auto hit = simulation.cast(ray); hit && hit->distance < distance)
+      nearest = Pick{Pick::What::kObstacle, hit->number, 0, {}, ray.at(hit->distance)};
     return nearest;
   });
 }
@@ -131,6 +125,22 @@ void Studio::end_drag() {
   if (drag_->pick.what != Pick::What::kObstacle)
     runner_.with([&](Simulation& simulation) { simulation.release(drag_->grip); });
   drag_.reset();
+}
+
+void Studio::toggle_pin(const Eigen::Vector2d& pixel, const PictureSize& picture) {
+  const std::optional<Pick> found = pick(pixel, picture);
+  if (!found || found->what != Pick::What::kBody) return say("P pins the body under the mouse: there is none");
+  try {
+    runner_.with([&](Simulation& simulation) { simulation.toggle_pin(found->number, found->place); });
+  } catch (const Error& error) {
+    say(error.what());
+  }
+}
+
+void Studio::toggle_pin_near(std::size_t body, const Eigen::Vector3d& point) {
+  const BodyShape& shape = *shapes_[kinds_[body]];
+  const SurfaceHit place = nearest_place(point, shape.rest, shape.triangles);
+  runner_.with([&](Simulation& simulation) { simulation.toggle_pin(body, place); });
 }
 
 int Studio::grab_near(std::size_t body, const Eigen::Vector3d& point) {

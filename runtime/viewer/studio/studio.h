@@ -53,6 +53,11 @@ class Studio {
   void end_drag();
   bool dragging() const { return drag_.has_value(); }
 
+  /// Pins the body under the mouse there, or lets it go; tells in message() why not where that cannot be.
+  void toggle_pin(const Eigen::Vector2d& pixel, const PictureSize& picture);
+  /// The same at the point of its surface at rest that is nearest to `point`. Throws exmat::Error.
+  void toggle_pin_near(std::size_t body, const Eigen::Vector3d& point);
+
   /// The point of a body's surface at rest that is nearest to `point`; the grip's number.
   int grab_near(std::size_t body, const Eigen::Vector3d& point);
 

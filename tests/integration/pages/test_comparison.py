@@ -42,6 +42,12 @@ class Comparison(unittest.TestCase):
         self.assertNotEqual(self.check("<!-- run: true --> and words\n")[0], [])
         self.assertEqual(self.check("<!-- status: 1 -->\n\n    false\n\n<!-- skip -->\n\n    exit 3\n")[0], [])
 
+    def test_what_needs_a_package_is_left_out_without(self):
+        page = f"<!-- needs: {{}} -->\n<!-- run: echo a 1 -->\n\n{FENCE}\na 2\n{FENCE}\n\n    echo b 1\n\n{FENCE}\nb {{}}\n{FENCE}\n"
+        self.assertEqual(self.check(page.format("no-such-package", 1))[0], [])
+        self.assertEqual(len(self.check(page.format("no-such-package", 2))[0]), 1)
+        self.assertEqual(len(self.check(page.format("eigen3", 1))[0]), 1)
+
     def test_quotes(self):
         page = "<!-- quote: examples/engine/cookbook.cpp {} -->\n" + f"{FENCE}cpp\nint x;\n{FENCE}\n"
         self.assertEqual(len(self.check(page.format("model"))[0]), 1)

@@ -12,6 +12,7 @@ Each page is run from top to bottom in an empty folder, with the programs and ex
   <!-- file: NAME -->    the next fenced block is written to NAME
   <!-- folder: NAME -->  the page's folder, below a top folder that has examples and docs; else build/pages, and
                          indented blocks are not run
+  <!-- needs: PACKAGE --> the next run, and the block that it prints, are left out where pkg-config knows no such package
   <!-- run: COMMAND -->  a command that is not shown; EXMAT_TOP is the repository, EXMAT_BUILD the build folder
   <!-- rows: COMMAND --> the command prints the last numbers of each row of the next table; $1, $2... are the row's cells
   <!-- quote: FILE PART --> the next fenced block is what FILE (from the top folder) has between "// recipe: PART" and
@@ -46,8 +47,8 @@ PROGRESS = re.compile(r"[a-z ]+: \d+ of \d+, \d+ s, about \d+ s left")
 CLOCK = re.compile(r"\[\d\d:\d\d:\d\d\]")
 HASH = re.compile(r"\b(?=[0-9a-f]*[a-f])(?=[0-9a-f]*\d)[0-9a-f]{8,64}\b")
 NUMBER = re.compile(r"(?<![\w.])-?\d[\d,]*(?:\.\d+)?(?:e[-+]\d+)?(?![\w.]*[A-Za-z_])")
-DIRECTIVE = re.compile(r"<!-- (file|folder|run|rows|quote|status|skip)(?:: (.*?))? -->", re.S)
-BEGUN = re.compile(r"<!-- (file|folder|run|rows|quote|status|skip)\b")
+DIRECTIVE = re.compile(r"<!-- (file|folder|needs|run|rows|quote|status|skip)(?:: (.*?))? -->", re.S)
+BEGUN = re.compile(r"<!-- (file|folder|needs|run|rows|quote|status|skip)\b")
 
 
 class Block:
@@ -239,10 +240,11 @@ class Page:
                 self.differ(at, self.lines[at], row)
 
     def run(self):
-        status, file, skip, rows, quote = 0, None, False, None, None
+        status, file, skip, rows, quote, needs = 0, None, False, None, None, None
         for block in blocks_of(self.lines):
-            if block.kind in ("file", "rows", "status", "skip", "quote"):
+            if block.kind in ("file", "needs", "rows", "status", "skip", "quote"):
                 file = block.word if block.kind == "file" else file
+                needs = block.word if block.kind == "needs" else needs
                 rows = block.word if block.kind == "rows" else rows
                 quote = block.word if block.kind == "quote" else quote
                 status = int(block.word) if block.kind == "status" else status
@@ -254,10 +256,13 @@ class Page:
                 self.runs = True
             elif skip and block.kind in ("fence", "commands", "table"):
                 skip = False
+            elif block.kind == "run" and needs and subprocess.run(["pkg-config", "--exists", needs], check=False).returncode:
+                print(f"{self.name}:{block.first + 1}: left out: there is no {needs}")
+                skip, needs = True, None
             elif block.kind == "run" or (block.kind == "commands" and self.runs):
                 command = block.word if block.kind == "run" else "\n".join(block.lines)
                 self.printed += self.shell(command, block.first, status)
-                status = 0
+                status, needs = 0, None
             elif block.kind == "fence" and quote:
                 self.compare_quote(block, quote)
                 quote = None

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <exmat/exmat.hpp>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -27,9 +28,12 @@ class RayThroughAWorld : public ::testing::Test {
     const std::array bars{test::BarOptions{.free = true},
                           test::BarOptions{.cells = {3, 2, 2}, .lengths = {0.5, 0.4, 0.3}, .free = true}};
     for (std::size_t i = 0; i < bars.size(); ++i) {
-      write_bundle(test::make_bar(bars[i]).model, folder_ / names_[i]);
+      test::Bar bar = test::make_bar(bars[i]);
+      bar.model.contact = test::surface_contact(bar.model);
+      write_bundle(bar.model, folder_ / names_[i]);
       exmat_settings settings = exmat::default_settings();
       settings.space = i == 0 ? EXMAT_SPACE_REDUCED : EXMAT_SPACE_FULL;
+      settings.use_contact = 1;
       models_.emplace_back(folder_ / names_[i], settings);
       surfaces_.emplace_back(models_[i], EXMAT_SURFACE_OBJECT);
     }
@@ -146,6 +150,55 @@ TEST_F(RayThroughAWorld, SeesBodiesByTheirSurfacesAlone) {
   EXPECT_FALSE(world_.cast_ray({}, from, along));
 }
 
+// The plane and the box are where they were moved to; what is nearer of bodies and obstacles is met.
+TEST_F(RayThroughAWorld, MeetsObstaclesThatLieBeforeBodies) {
+  both_ = {&surfaces_[0], &surfaces_[1]};
+  exmat_obstacle obstacle = exmat::default_obstacle();
+  const std::int64_t plane = world_.add_obstacle(obstacle);
+  obstacle.shape = EXMAT_BOX;
+  const std::int64_t box = world_.add_obstacle(obstacle);
+  exmat_motion motion{};
+  motion.orientation[0] = 1;
+  motion.position[2] = -30;
+  world_.move_obstacle(plane, motion);
+  motion.position[2] = 20;
+  motion.orientation[0] = motion.orientation[3] = std::sqrt(0.5);
+  motion.linear_velocity[0] = 3;
+  world_.move_obstacle(box, motion);
+  const std::optional<exmat::RayHit> lid = cast({0.2, 0.3, 25}, {0, 0, -2});
+  ASSERT_TRUE(lid);
+  EXPECT_EQ(lid->obstacle, box);
+  EXPECT_EQ(lid->body, -1);
+  EXPECT_EQ(lid->surface, -1);
+  EXPECT_EQ(lid->triangle, -1);
+  EXPECT_NEAR(lid->distance, 4, 1e-14);
+  EXPECT_LE((Eigen::Vector3d(lid->normal.data()) - Eigen::Vector3d::UnitZ()).norm(), 1e-15);
+  EXPECT_FALSE(cast({0.2, 0.3, 25}, {0, 0, -2}, 3.9));
+  world_.step();  // the box goes on
+  EXPECT_FALSE(cast({-0.99999, 0, 25}, {0, 0, -1}, 5));
+  EXPECT_TRUE(cast({1.00001, 0, 25}, {0, 0, -1}, 5));
+
+  const std::optional<exmat::RayHit> below = cast({50, 50, 0}, {0, 3, -4});
+  ASSERT_TRUE(below);
+  EXPECT_EQ(below->obstacle, plane);
+  EXPECT_NEAR(below->distance, 30 / 0.8, 1e-12);
+  EXPECT_FALSE(cast({50, 50, -31}, {0, 0, 1}));  // from within
+
+  const Eigen::Vector3d middle = triangles(2, surfaces_[1]).front().rowwise().mean();
+  const std::optional<exmat::RayHit> body = cast(middle + Eigen::Vector3d(0, 0, 12), {0, 0, -1});
+  ASSERT_TRUE(body);
+  EXPECT_GE(body->body, 0);
+  EXPECT_EQ(body->obstacle, -1);
+  const std::array from{middle[0], middle[1], middle[2] + 12}, down{0.0, 0.0, -1.0};
+  EXPECT_EQ(world_.cast_ray({}, from, down)->obstacle, plane);
+  // Callers from before obstacles were seen go on without.
+  exmat_ray_hit old{};
+  old.size = offsetof(exmat_ray_hit, obstacle);
+  ASSERT_EQ(exmat_world_cast_ray(world_.get(), nullptr, 0, from.data(), down.data(), INFINITY, &old), EXMAT_OK);
+  EXPECT_EQ(old.body, -1);
+  EXPECT_EQ(old.distance, 0);
+}
+
 TEST_F(RayThroughAWorld, RefusesWhatIsNoRay) {
   const exmat_surface* const surface = surfaces_[0].get();
   const exmat_surface* const none = nullptr;
@@ -170,7 +223,7 @@ TEST_F(RayThroughAWorld, RefusesWhatIsNoRay) {
   EXPECT_EQ(exmat_world_cast_ray(world_.get(), &surface, 1, origin.data(), up.data(), 1, nullptr),
             EXMAT_INVALID_ARGUMENT);
   hit.size = 8;
-  refuses(&surface, 1, origin.data(), up.data(), 1, "size = 8: expected 88");
+  refuses(&surface, 1, origin.data(), up.data(), 1, "size = 8: expected 96");
 }
 
 TEST(DeformedBox, HoldsAllPointsAndIsTightAtRest) {

@@ -235,6 +235,27 @@ def test_ties_that_rounding_would_move_are_refused(free_bundle):
         bodies[0].attach_to(end_of(model)[0], bodies[1], [0, 1], kind="fixed")
 
 
+def test_ties_of_full_space_are_refused(free_bundle):
+    for spaces in (("full", "reduced"), ("reduced", "auto"), ("full", "full")):
+        world = exmat.World()
+        for space in spaces:
+            world.add(exmat.Body(exmat.Model(free_bundle, time_step=0.004, use_contact=True, space=space)))
+        for own, other in ((0, 1), (1, 0)):
+            with pytest.raises(exmat.InvalidArgument, match="may step in all vertices: expected two bodies of space reduced"):
+                world[own].attach_to([0, 1, 2], world[other], [0, 1, 2], kind="ball")
+    world = exmat.World()
+    for _ in range(2):
+        body = exmat.Body(exmat.Model(free_bundle, time_step=0.004, use_contact=True, space="auto"))
+        body.space = "reduced"
+        world.add(body)
+    tied = world[0].attach_to([0, 1, 2], world[1], [0, 1, 2], kind="ball")
+    for body in world.bodies:  # the one that is held, and the one that holds
+        with pytest.raises(exmat.InvalidArgument, match="detach it first"):
+            body.space = "full"
+    world[0].detach(tied)
+    world[1].space = "full"
+
+
 def test_frames_have_a_rotation(free_bundle):
     body = exmat.Body(exmat.Model(free_bundle))
     for turn, determinant in ((np.zeros((3, 3)), "0"), (np.diag([1, 1, -1]), "-1"), (np.diag([1, 1, 0]), "0")):

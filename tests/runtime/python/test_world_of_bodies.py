@@ -61,6 +61,11 @@ def test_a_ray_meets_the_nearest_body(model, world):
         np.testing.assert_allclose(place, origin + hit.distance * np.array(direction) / np.linalg.norm(direction), atol=1e-12)
         assert world.cast_ray([surface], origin, direction, within=0.99 * hit.distance) is None
     assert world.cast_ray([], origin, direction) is None
+    floor = world.add_obstacle(exmat.Shape.sphere(0.5, (0, 0, -4)))
+    hit = world.cast_ray([surface], (0, 0, -9), (0, 0, 1))
+    assert (hit.obstacle, hit.body, hit.triangle, hit.surface) == (floor, -1, -1, -1)
+    np.testing.assert_allclose([hit.distance, *hit.normal], [4.5, 0, 0, -1], atol=1e-14)
+    assert own.obstacle == -1
     with pytest.raises(exmat.InvalidArgument, match="direction: expected one that is not 0"):
         world.cast_ray([surface], origin, [0, 0, 0])
     with pytest.raises(exmat.InvalidArgument, match="surfaces: expected surfaces, found None"):

@@ -55,6 +55,17 @@ TEST_F(Scripts, DragAPointAlongItsWay) {
   EXPECT_TRUE(simulation_->snapshot({}).grips.empty());
 }
 
+TEST_F(Scripts, PinAndLetGo) {
+  ScriptPlayer script =
+      player(R"([{"time": 0, "pin": {"point": [1, 0, 0]}}, {"time": 1, "pin": {"point": [1, 0, 0], "body": 0}}])");
+  script.play(0);
+  EXPECT_EQ(simulation_->snapshot({}).pins.size(), 1U);
+  script.play(1);
+  EXPECT_TRUE(simulation_->snapshot({}).pins.empty());
+  EXPECT_THAT(fault(R"([{"time": 0, "pin": {"point": [0, 0, 0], "body": 3}}])"),
+              HasSubstr("/actions/0/pin/body: expected a body, 0 to 0"));
+}
+
 TEST_F(Scripts, SetAndShow) {
   player(R"([{"time": 0, "set": {"gravity": [0, 1, 0], "stiffness": 70, "weights": [0.5, 0.5], "speed": 0.5},
     "show": {"wireframe": true, "colour": "strain_energy"}, "camera": {"position": [0, -5, 0], "target": [0, 0, 0]}}])")

@@ -136,6 +136,68 @@ TEST_F(Simulations, FollowAHandAndLetGo) {
   for (std::size_t i = 0; i < rest.size(); ++i) EXPECT_NEAR(positions[i], rest[i], 1e-3);
 }
 
+// In its modes, in all vertices, and by a spring where bodies may touch.
+TEST_F(FreeSimulations, HangOnAPinUntilItIsTakenOut) {
+  const std::string settings = R"("gravity": [0, 0, -9.81], "damping": {"mass": 2, "stiffness": 0.02})";
+  for (const char* const bodies : {R"("bundle": "bar.h5", "space": "reduced")", R"("bundle": "bar.h5")",
+                                   R"("bodies": [{"name": "bar", "bundle": "bar.h5"}], "space": "reduced")"}) {
+    SCOPED_TRACE(bodies);
+    Simulation simulation = make("{" + std::string(bodies) + ", " + settings + "}");
+    const SurfaceHit place = tip(simulation);
+    const auto height = [&] {
+      const std::vector<float> now = simulation.positions(0);
+      double z = 0;
+      for (int c = 0; c < 3; ++c)
+        z += place.shares[c] * now[3 * static_cast<std::size_t>(simulation.shape(0)->point(place.triangle, c)) + 2];
+      return z;
+    };
+    const auto centre = [&] { return simulation.snapshot({}).bodies[0].motion.position[2]; };
+    const double rest = height();
+    simulation.toggle_pin(0, place);
+    ASSERT_EQ(simulation.snapshot({}).pins.size(), 1U);
+    EXPECT_LE((simulation.snapshot({}).pins[0] - simulation.shape(0)->rest_place(place)).norm(), 1e-6);
+    simulation.advance(400);
+    EXPECT_TRUE(simulation.failure().empty());
+    EXPECT_NEAR(height(), rest, 0.02);  // about what is held it turns
+    EXPECT_LT(centre(), -0.1);
+    simulation.toggle_pin(0, place);
+    EXPECT_TRUE(simulation.snapshot({}).pins.empty());
+    const double before = height();
+    simulation.advance(600);
+    EXPECT_LT(height(), before - 0.5);
+    simulation.toggle_pin(0, place);
+    simulation.reset();
+    EXPECT_TRUE(simulation.snapshot({}).pins.empty());
+    simulation.advance(400);
+    EXPECT_LT(centre(), -0.5);
+  }
+}
+
+TEST_F(Simulations, AreMetByRaysBeforeObstaclesOrAfter) {
+  Simulation simulation = make(R"({"bundle": "bar.h5"})");
+  const auto& bounds = simulation.shape(0)->bounds;
+  exmat_obstacle floor = default_obstacle();  // between the eye and the ball: not met
+  floor.point[2] = bounds.most.z() + 3;
+  simulation.add_obstacle(floor);
+  exmat_obstacle ball = default_obstacle();
+  ball.shape = EXMAT_SPHERE;
+  ball.radius = 0.5;
+  std::copy_n(bounds.centre().data(), 3, ball.point);
+  ball.point[2] = bounds.most.z() + 2;
+  simulation.add_obstacle(ball);
+  const Ray down{bounds.centre() + Eigen::Vector3d(0, 0, 9), {0, 0, -1}};
+  const auto hit = simulation.cast(down);
+  ASSERT_TRUE(hit);
+  EXPECT_EQ(hit->number, 1U);
+  EXPECT_NEAR(down.at(hit->distance).z(), bounds.most.z() + 2.5, 1e-7);
+  const auto body = simulation.cast(0, down, 1e300);
+  ASSERT_TRUE(body);
+  EXPECT_NEAR(down.at(body->distance).z(), bounds.most.z(), 1e-6);
+  EXPECT_LE((simulation.shape(0)->rest_place(*body) - down.at(body->distance)).norm(), 1e-6);
+  EXPECT_FALSE(simulation.cast(0, down, 0.9 * body->distance));
+  EXPECT_FALSE(simulation.cast({down.origin, {0, 0, 1}}));
+}
+
 TEST_F(Simulations, GoOnUnderAnotherModel) {
   Simulation simulation = make();
   simulation.advance(200);
