@@ -104,5 +104,5 @@ export const SCENES = {
   sag: { bodies: [{}], clamped: true, frames: 360, damping: 4 },
   floor: { bodies: grid(1), planes: FLOOR, frames: 180, timed: [60, 180] },
   apart: { bodies: grid(200), planes: FLOOR, frames: 90, timed: [60, 90] },
-  ...Object.fromEntries([20, 50, 100].map((count) => [`pile ${count}`, { bodies: heap(count), planes: [...FLOOR, ...WALLS], damping: 0.5, frames: 300, timed: [0, 120], rest: [270, 300] }])),
+  ...Object.fromEntries([20, 50, 100].map((count) => [`pile ${count}`, { bodies: heap(count), planes: [...FLOOR, ...WALLS], damping: 0.5, frames: 240, timed: [0, 120], rest: [210, 240] }])),
 };

@@ -6,7 +6,7 @@ import { FRAME, FRICTION, GRAVITY, MATERIAL } from "./blocks.mjs";
 import { free, worldOf } from "./scene.js";
 
 const [programs, folder] = process.argv.slice(2);
-const run = (program, ...words) => execFileSync(join(programs, program), words, { encoding: "utf8", stdio: ["ignore", "pipe", "inherit"] });
+const run = (program, ...words) => execFileSync(join(programs, program), words, { encoding: "utf8", stdio: ["ignore", "pipe", "inherit"], maxBuffer: 2 ** 28 });
 
 /** Gmsh's file of a mesh. */
 function msh({ points, tets, vertices }) {
@@ -58,10 +58,10 @@ const OURS = [["reduced", 4], ["reduced", 1], ["full", 4]];
 const named = (space, steps) => `${space === "full" ? "all vertices" : "r = 20"}, ${steps === 1 ? "a step" : `${steps} steps`}`;
 export const engines = OURS.map(([space, steps]) => ({ name: `exmat, ${named(space, steps)}`, create: (what) => create(space, steps, what) }));
 
-/** Seconds of the processor of each frame, by the native library. */
+/** The same by the native library. */
 export const natives = OURS.map(([space, steps]) => ({
   name: `exmat native, ${named(space, steps)}`,
-  frames({ mesh, scene }) {
+  run({ mesh, scene }) {
     const file = join(folder, "native.json");
     writeFileSync(file, JSON.stringify(sceneOf(scene, bundle(mesh, scene.clamped, "smoothed", true), space, steps)));
     return JSON.parse(run("exmat-peers-benchmark", file, String(scene.frames), String(steps)));

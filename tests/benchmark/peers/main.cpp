@@ -1,10 +1,14 @@
-// Steps a scene and prints the processor's seconds of each frame as JSON. exmat.mjs calls it.
+// Steps a scene. Prints as JSON the processor's seconds of each frame, the places of a single body's vertices after
+// each, and the mean height of all vertices at the end. exmat.mjs calls it.
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
 #include <exmat/exmat.hpp>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <span>
+#include <string>
 #include <vector>
 
 namespace {
@@ -24,13 +28,26 @@ int main(int argc, char** argv) {
   }
   try {
     exmat::World world = exmat::World::from_scene(argv[1]);
-    std::vector<double> seconds(static_cast<std::size_t>(std::atoi(argv[2])));
-    for (double& frame : seconds) {
+    const std::vector<std::int64_t> ids = world.ids();
+    const exmat::Points vertices = exmat::Points::all_vertices(world.body(ids.front()).model());
+    std::vector<float> xyz(static_cast<std::size_t>(3 * vertices.size()));
+    std::vector<std::string> seconds, ways;
+    for (int frame = 0; frame < std::atoi(argv[2]); ++frame) {
       const double start = processor_seconds();
       world.step(std::atoi(argv[3]), 1);
-      frame = processor_seconds() - start;
+      seconds.push_back(fmt::format("{:.9f}", processor_seconds() - start));
+      if (ids.size() > 1) continue;
+      world.body(ids.front()).read_positions(vertices, std::span(xyz));
+      ways.push_back(fmt::format("[{:.7g}]", fmt::join(xyz, ",")));
     }
-    fmt::print("[{}]\n", fmt::join(seconds, ", "));
+    double height = 0;
+    for (const std::int64_t id : ids) {
+      world.body(id).read_positions(vertices, std::span(xyz));
+      for (std::size_t i = 2; i < xyz.size(); i += 3) height += static_cast<double>(xyz[i]);
+    }
+    height /= static_cast<double>(ids.size() * xyz.size() / 3);
+    fmt::print(R"({{"seconds": [{}], "ways": [{}], "height": {}}})", fmt::join(seconds, ","), fmt::join(ways, ","),
+               height);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "%s\n", error.what());
     return 1;

@@ -9,13 +9,13 @@ import * as jolt from "./jolt.mjs";
 import * as mujoco from "./mujoco.mjs";
 import * as rapier from "./rapier.mjs";
 
-const page = process.argv[4], ENGINES = [...exmat.engines, ...jolt.engines, ...rapier.engines, ...mujoco.engines];
-const BLOCKS = [{ cells: [4, 2, 2], scenes: Object.keys(SCENES) }, { cells: [8, 3, 3], scenes: Object.keys(SCENES).filter((name) => !/50|100/.test(name)) }];
+const page = process.argv[4], ENGINES = [...exmat.natives, ...exmat.engines, ...jolt.engines, ...rapier.engines, ...mujoco.engines];
+const BLOCKS = [{ cells: [4, 2, 2], scenes: Object.keys(SCENES) }, { cells: [8, 3, 3], scenes: Object.keys(SCENES).filter((name) => !/apart|50|100/.test(name)) }];
 const FINE = block(16, 8, 8), ROUNDS = 3;
 
 const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
 const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]);
-const point = (xyz, i) => [...xyz.subarray(3 * i, 3 * i + 3)];
+const point = (xyz, i) => [...xyz.slice(3 * i, 3 * i + 3)];
 const middle = (xyz, points) => [0, 1, 2].map((k) => mean(points.map((i) => xyz[3 * i + k])));
 const TIP = middle(FINE.points, FINE.tip);
 
@@ -34,18 +34,20 @@ function rotation(from, to) {
 /** Angle between two rotations [degrees]. */
 const angle = (a, b) => (180 / Math.PI) * Math.acos(Math.min(1, (a.flat().reduce((sum, value, i) => sum + value * b.flat()[i], 0) - 1) / 2));
 
-/** Seconds of the processor for each frame; `watch` sees the world after each. */
-async function run(engine, what, watch = () => {}) {
-  const world = await engine.create(what), seconds = [];
-  for (let frame = 0; frame < what.scene.frames; ++frame) {
+/** The processor's seconds of each frame, where a single body's vertices are after each, and the mean height of all at the end. */
+async function run(engine, what) {
+  if (engine.run) return engine.run(what);
+  const world = await engine.create(what), { bodies, frames } = what.scene, seconds = [], ways = [];
+  for (let frame = 0; frame < frames; ++frame) {
     const start = process.cpuUsage();
     world.frame();
     const { user, system } = process.cpuUsage(start);
     seconds.push(1e-6 * (user + system));
-    watch(world, frame);
+    if (bodies.length === 1) ways.push([...world.positions(0)]);
   }
+  const height = mean(bodies.map((_, i) => mean([...world.positions(i)].filter((_, k) => k % 3 === 2))));
   world.free();
-  return seconds;
+  return { seconds, ways, height };
 }
 
 /** Microseconds of a body in a frame. */
@@ -64,14 +66,11 @@ const percent = (value) => `${value > 0 ? "+" : ""}${value.toFixed(Math.abs(valu
 const offWay = (tips, real) => 100 * Math.sqrt(mean(tips.map((tip, i) => distance(tip, real[i + 1]) ** 2)) / mean(tips.map((tip, i) => distance(real[i + 1], TIP) ** 2)));
 
 const fine = truths(FINE, "smoothed"), flight = exmat.truth(FINE, SCENES.flight, "smoothed"), turn = rotation(flight[0], flight.at(-1));
-const identity = [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
 
 async function errors(engine, mesh) {
-  const same = truths(mesh, engine.name.startsWith("exmat") ? "smoothed" : "linear"), tips = { swing: [], sag: [] };
-  for (const name of ["swing", "sag"])
-    await run(engine, { mesh, scene: { ...SCENES[name], frames: name === "swing" ? 60 : SCENES.sag.frames } }, (world) => tips[name].push(middle(world.positions(0), mesh.tip)));
-  let turned;
-  await run(engine, { mesh, scene: SCENES.flight }, (world, frame) => { if (frame === SCENES.flight.frames - 1) turned = rotation(mesh.points, world.positions(0)); });
+  const same = truths(mesh, engine.name.startsWith("exmat") ? "smoothed" : "linear"), tips = {};
+  for (const [name, scene] of [["swing", { ...SCENES.swing, frames: 60 }], ["sag", SCENES.sag]]) tips[name] = (await run(engine, { mesh, scene })).ways.map((xyz) => middle(xyz, mesh.tip));
+  const turned = rotation(mesh.points, (await run(engine, { mesh, scene: SCENES.flight })).ways.at(-1));
   const off = (kind, real) => kind === "sag" ? percent(100 * (sagOf(tips.sag) / sagOf(real.sag) - 1)) : offWay(tips.swing, real.swing).toFixed(1);
   return [...["sag", "swing"].map((kind) => `${off(kind, fine)} (${off(kind, same)})`), angle(turned, turn).toFixed(1)];
 }
@@ -81,39 +80,45 @@ function number(value) {
 }
 
 const table = (header, rows) => [header, header.map(() => "---"), ...rows].map((row) => `| ${row.join(" | ")} |`).join("\n");
-const out = [], heights = [];
-for (const { cells, scenes } of BLOCKS) {
-  const mesh = block(...cells), times = new Map([...ENGINES, ...exmat.natives].map((engine) => [engine, {}])), off = new Map();
-  for (const engine of ENGINES) off.set(engine, await errors(engine, mesh));
-  for (const name of scenes.filter((name) => SCENES[name].timed)) {
-    const scene = SCENES[name], pile = scene.rest !== undefined;
-    for (let round = 0; round < (scene.bodies.length < 50 ? ROUNDS : 1); ++round)
-      for (const [engine, found] of times) {
-        if ((pile && engine.apart) || scene.bodies.length > engine.most) continue;
-        let height;
-        const seconds = engine.frames ? engine.frames({ mesh, scene })
-          : await run(engine, { mesh, scene }, (world, frame) => { if (pile && frame === scene.frames - 1) height = mean(scene.bodies.map((_, i) => mean([...world.positions(i)].filter((_, k) => k % 3 === 2)))); });
-        const own = [scene.timed, ...(pile ? [scene.rest] : [])].map((frames) => micros(seconds, frames, scene));
-        found[name] = found[name] ? own.map((time, i) => Math.min(time, found[name][i])) : own;
-        if (pile && round === 0 && height !== undefined && name === "pile 20") heights.push([mesh.tets.length, engine.name, height.toFixed(3)]);
-        console.error(mesh.tets.length, name, engine.name, own.map(number).join(" "), height ?? "");
-      }
-  }
-  const columns = scenes.filter((name) => SCENES[name].timed), title = { swing: "clamped, swinging", floor: "alone on a floor", apart: "200 on a floor" };
-  const header = [`${mesh.tets.length} tets`, title.swing, "sag off [%]", "swing off [%]", "turn off [degrees]", ...columns.slice(1).map((name) => title[name] ?? `${name.replace("pile", "pile of")}: falling, at rest`)];
-  const rows = [...times].map(([engine, found]) => {
-    const cell = (name) => found[name]?.map(number).join(", ") ?? (SCENES[name].rest && engine.apart ? "none" : "");
-    return [engine.name, cell("swing"), ...(off.get(engine) ?? ["", "", ""]), ...columns.slice(1).map(cell)];
-  });
-  out.push(table(header, rows));
-  const own = { linear: truths(mesh, "linear"), smoothed: truths(mesh, "smoothed") };
-  out.push(`In full space the tip of this mesh sags by ${(-1000 * sagOf(own.linear.sag)).toFixed(0)} mm by tets of constant strain and ` +
-           `${(-1000 * sagOf(own.smoothed.sag)).toFixed(0)} mm by exmat's smoothed ones.`);
-}
 const version = (name) => JSON.parse(readFileSync(new URL(`node_modules/${name}/package.json`, import.meta.url))).version;
-out.unshift(`${cpus()[0].model}, Node ${process.versions.node}; Jolt ${version("jolt-physics")}, Rapier ${version("@dimforge/rapier3d-compat")}, MuJoCo ${version("@mujoco/mujoco")}. ` +
-            `The fine mesh has ${FINE.tets.length.toLocaleString("en-US")} tets; its tip sags by ${(-1000 * sagOf(fine.sag)).toFixed(0)} mm, its block turns by ${angle(turn, identity).toFixed(0)} degrees in the second.`);
-out.push(`Mean height of the centres of a pile of 20 at the end [m]: ${heights.map((row) => `${row[1]} (${row[0]} tets) ${row[2]}`).join("; ")}.`);
+const title = (name) => ({ floor: "alone on a floor", apart: "200 on a floor" })[name] ?? `${name.replace("pile", "pile of")}: falling, at rest`;
+const millimetres = (sag) => `${(-1000 * sag).toFixed(0)} mm`;
 
-const [begin, end] = ["<!-- peers: begin -->", "<!-- peers: end -->"], text = readFileSync(page, "utf8");
-writeFileSync(page, `${text.slice(0, text.indexOf(begin) + begin.length)}\n${out.join("\n\n")}\n${text.slice(text.indexOf(end))}`);
+/** Puts what there is into the page. */
+function write(measured) {
+  const parts = [`${cpus()[0].model}, Node ${process.versions.node}; Jolt ${version("jolt-physics")}, Rapier ${version("@dimforge/rapier3d-compat")}, MuJoCo ${version("@mujoco/mujoco")}. ` +
+                 `The fine mesh has ${FINE.tets.length.toLocaleString("en-US")} tets. Its tip sags by ${millimetres(sagOf(fine.sag))}, and it turns by ${angle(turn, rotation(flight[0], flight[0])).toFixed(0)} degrees in the second.`];
+  for (const { mesh, scenes, rows } of measured) {
+    const columns = scenes.filter((name) => SCENES[name].timed && name !== "swing");
+    const cell = ({ engine, found }, name) => found[name]?.map(number).join(", ") ?? (SCENES[name].rest && engine.apart ? "none" : "");
+    parts.push(table([`${mesh.tets.length} tets`, "clamped, swinging", "sag off [%]", "swing off [%]", "turn off [degrees]", ...columns.map(title)],
+                     rows.map((row) => [row.engine.name, cell(row, "swing"), ...row.off, ...columns.map((name) => cell(row, name))])));
+    const [linear, smoothed] = ["linear", "smoothed"].map((formulation) => millimetres(sagOf(truths(mesh, formulation).sag)));
+    const heights = rows.filter(({ height }) => height).map(({ engine, height }) => `${height.toFixed(2)} m (${engine.name})`);
+    parts.push(`In full space this mesh sags by ${linear} with tets of constant strain and by ${smoothed} with exmat's smoothed ones.` +
+               (heights.length > 0 ? ` Mean height of a pile of 20 at the end: ${heights.join(", ")}.` : ""));
+  }
+  const [begin, end] = ["<!-- peers: begin -->", "<!-- peers: end -->"], text = readFileSync(page, "utf8");
+  writeFileSync(page, `${text.slice(0, text.indexOf(begin) + begin.length)}\n${parts.join("\n\n")}\n${text.slice(text.indexOf(end))}`);
+}
+
+const measured = [];
+for (const { cells, scenes } of BLOCKS) {
+  const mesh = block(...cells), rows = [];
+  for (const engine of ENGINES) rows.push({ engine, off: await errors(engine, mesh), found: {} });
+  measured.push({ mesh, scenes, rows });
+  for (const name of scenes.filter((name) => SCENES[name].timed)) {
+    const scene = SCENES[name];
+    for (let round = 0; round < (scene.bodies.length === 1 ? ROUNDS : 1); ++round)
+      for (const row of rows) {
+        const { engine, found } = row;
+        if ((scene.rest && engine.apart) || scene.bodies.length > engine.most) continue;
+        const { seconds, height } = await run(engine, { mesh, scene });
+        const own = [scene.timed, scene.rest].filter(Boolean).map((frames) => micros(seconds, frames, scene));
+        found[name] = found[name] ? own.map((time, i) => Math.min(time, found[name][i])) : own;
+        if (name === "pile 20") row.height = height;
+        console.error(mesh.tets.length, name, engine.name, own.map(number).join(" "), height);
+      }
+    write(measured);
+  }
+}
