@@ -95,14 +95,14 @@ function heap(count) {
 const WALLS = [[[-0.2, 0, 0], [1, 0, 0]], [[2.6, 0, 0], [-1, 0, 0]], [[0, -0.6, 0], [0, 1, 0]], [[0, 2.1, 0], [0, -1, 0]]].map(([point, normal]) => ({ point, normal }));
 const FLOOR = [{ point: [0, 0, 0], normal: [0, 0, 1] }];
 
-const grid = (count) => [...Array(count).keys()].map((i) => ({ position: [1.5 * (i % 20), 0.75 * Math.floor(i / 20), 0.005] }));
+const grid = (count) => [...Array(count).keys()].map((i) => ({ position: [1.5 * (i % 20), 0.75 * Math.floor(i / 20), 0] }));
 
 /** What is stepped: bodies, planes that they touch, for how many frames, and the frames that are timed. */
 export const SCENES = {
   swing: { bodies: [{}], clamped: true, frames: 180, timed: [60, 180] },
   flight: { bodies: [{ spin: [1, 3, 2] }], frames: 60, weightless: true },
   sag: { bodies: [{}], clamped: true, frames: 360, damping: 4 },
-  floor: { bodies: grid(1), planes: FLOOR, frames: 180, timed: [60, 180] },
-  apart: { bodies: grid(200), planes: FLOOR, frames: 90, timed: [60, 90] },
+  floor: { bodies: grid(1), planes: FLOOR, damping: 4, frames: 180, timed: [60, 180] },
+  apart: { bodies: grid(200), planes: FLOOR, damping: 4, frames: 90, timed: [60, 90] },
   ...Object.fromEntries([20, 50, 100].map((count) => [`pile ${count}`, { bodies: heap(count), planes: [...FLOOR, ...WALLS], damping: 0.5, frames: 240, timed: [0, 120], rest: [210, 240] }])),
 };
