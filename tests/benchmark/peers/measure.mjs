@@ -82,12 +82,13 @@ function number(value) {
 const table = (header, rows) => [header, header.map(() => "---"), ...rows].map((row) => `| ${row.join(" | ")} |`).join("\n");
 const version = (name) => JSON.parse(readFileSync(new URL(`node_modules/${name}/package.json`, import.meta.url))).version;
 const title = (name) => ({ floor: "alone on a floor", apart: "200 on a floor" })[name] ?? `${name.replace("pile", "pile of")}: falling, at rest`;
+const wrapped = (text) => text.replace(/(?![^\n]{1,120}$)([^\n]{1,120})\s/g, "$1\n");
 const millimetres = (sag) => `${(-1000 * sag).toFixed(0)} mm`;
 
 /** Puts what there is into the page. */
 function write(measured) {
-  const parts = [`${cpus()[0].model}, Node ${process.versions.node}; Jolt ${version("jolt-physics")}, Rapier ${version("@dimforge/rapier3d-compat")}, MuJoCo ${version("@mujoco/mujoco")}. ` +
-                 `The fine mesh has ${FINE.tets.length.toLocaleString("en-US")} tets. Its tip sags by ${millimetres(sagOf(fine.sag))}, and it turns by ${angle(turn, rotation(flight[0], flight[0])).toFixed(0)} degrees in the second.`];
+  const parts = [wrapped(`${cpus()[0].model}, Node ${process.versions.node}; Jolt ${version("jolt-physics")}, Rapier ${version("@dimforge/rapier3d-compat")}, MuJoCo ${version("@mujoco/mujoco")}. ` +
+                 `The fine mesh has ${FINE.tets.length.toLocaleString("en-US")} tets. Its tip sags by ${millimetres(sagOf(fine.sag))}, and it turns by ${angle(turn, rotation(flight[0], flight[0])).toFixed(0)} degrees in the second.`)];
   for (const { mesh, scenes, rows } of measured) {
     const columns = scenes.filter((name) => SCENES[name].timed && name !== "swing");
     const cell = ({ engine, found }, name) => found[name]?.map(number).join(", ") ?? (SCENES[name].rest && engine.apart ? "none" : "");
@@ -95,8 +96,8 @@ function write(measured) {
                      rows.map((row) => [row.engine.name, cell(row, "swing"), ...row.off, ...columns.map((name) => cell(row, name))])));
     const [linear, smoothed] = ["linear", "smoothed"].map((formulation) => millimetres(sagOf(truths(mesh, formulation).sag)));
     const heights = rows.filter(({ height }) => height).map(({ engine, height }) => `${height.toFixed(2)} m (${engine.name})`);
-    parts.push(`In full space this mesh sags by ${linear} with tets of constant strain and by ${smoothed} with exmat's smoothed ones.` +
-               (heights.length > 0 ? ` Mean height of a pile of 20 at the end: ${heights.join(", ")}.` : ""));
+    parts.push(wrapped(`In full space this mesh sags by ${linear} with tets of constant strain and by ${smoothed} with exmat's smoothed ones.` +
+               (heights.length > 0 ? ` Mean height of a pile of 20 at the end: ${heights.join(", ")}.` : "")));
   }
   const [begin, end] = ["<!-- peers: begin -->", "<!-- peers: end -->"], text = readFileSync(page, "utf8");
   writeFileSync(page, `${text.slice(0, text.indexOf(begin) + begin.length)}\n${parts.join("\n\n")}\n${text.slice(text.indexOf(end))}`);
