@@ -1,4 +1,4 @@
-// The same bodies by exmat and by Bullet's btReducedDeformableBody, in turns: a table for docs/performance.md.
+// The same bodies by exmat and by Bullet's btReducedDeformableBody, in turns: a table for docs/comparison.md.
 #include <algorithm>
 #include <ctime>
 #include <fmt/format.h>
