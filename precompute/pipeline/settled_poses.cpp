@@ -182,7 +182,7 @@ SettledPose PoseSettler::settle(Eigen::Index group, Eigen::Index k) const {
   found.example = examples_of(model_, found.region).examples[static_cast<std::size_t>(k)].name;
   found.basis = norm(pose.given - in_basis) / size;
   found.clamp = full_ ? found.basis : norm(pose.carried - pose.clamped) / size;
-  found.compensable = !full_ && found.region.empty() && model_.targets && !is_elastic(group);
+  found.compensable = !full_ && !load_.compensate && found.region.empty() && model_.targets && !is_elastic(group);
 
   Shape best;
   for (const double strength : strengths(group)) {
