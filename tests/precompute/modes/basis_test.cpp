@@ -243,8 +243,8 @@ TEST_P(Basis, OfFewMotionsHoldsModesToo) {
   EXPECT_LE(lost(modes_.modes.col(2)), 0.05);  // no motion has shown it
 }
 
-// Poses are there for whoever asks for them. Forty motions that never come near two of them fill a basis of ten; the two
-// are put first then, and held to rounding.
+// Poses are there for whoever asks for them. Forty motions that never come near two of them fill a basis of ten; the
+// two are put first then, and held to rounding.
 TEST_P(Basis, OfMotionsHoldsExamplesThatNoMotionShows) {
   const auto deforming = [&](Eigen::MatrixXd fields) {
     if (system_.null_space.cols() > 0)
