@@ -34,7 +34,7 @@ void put(const btVector3& vector, std::size_t point, Numbers& numbers) {
 /// A body of exmat as a solver sees it: k points that have velocities and an inverse mass, and take impulses.
 class SoftBody {
  public:
-  /// Of a model; `rest` [3k]: places of the points where the body is at rest [m].
+  /// `rest` [3k]: places of the points where the body of the model is at rest [m].
   SoftBody(const exmat_model* model, const Numbers& rest)
       : places(rest), velocities(rest.size()), inverse_mass(rest.size() * rest.size()), count_(std::ssize(rest)) {
     check(exmat_body_create(model, &body));
@@ -211,7 +211,7 @@ class Coupling {
         shared_(3 * (kinds_.size() - std::ranges::count(kinds_, Kind::kOnFloor))) {}
 
   void step(double dt) {
-    // What is held carries the impulses of the last step as forces through this one, so that little is left to correct
+    // A held body carries the impulses of the last step as forces through this one, so that little is left to correct
     // at its end, and nothing where it rests. A free light body between heavy ones would turn away under such forces.
     limits_ = impulses;
     if (!carries_) std::ranges::fill(impulses, 0);
@@ -228,7 +228,7 @@ class Coupling {
     }
   }
 
-  /// Of the joints, how far the two sides are apart; of contacts, how deep one is in the other [m].
+  /// Largest distance of the two sides of a joint, or depth of a contact [m].
   double error() const {
     double most = 0;
     for (std::size_t i = 0; i < kinds_.size(); ++i) {
@@ -333,7 +333,7 @@ void start(exmat_body* body, double speed, double by) {
   check(exmat_body_set_motion(body, &motion));
 }
 
-/// What Bullet needs for a world.
+/// The parts of a world of Bullet.
 struct Bullet {
   btDefaultCollisionConfiguration configuration;
   btCollisionDispatcher dispatcher{&configuration};

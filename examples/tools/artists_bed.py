@@ -123,17 +123,11 @@ def joint(pivot, axis, degrees, toward, width):
     return lambda p: turned(p, axis, np.radians(degrees) * smooth(((p - pivot) @ toward) / width + 0.5), pivot)
 
 
-def squash(axis, factor, base=0):
+def squash(axis, factor):
     """To so much of its length, at the same volume."""
-    a = "xyz".index(axis)
-
-    def pose(p):
-        scale = np.full(3, factor**-0.5)
-        scale[a] = factor
-        origin = np.zeros(3)
-        origin[a] = base
-        return origin + (p - origin) * scale
-    return pose
+    scale = np.full(3, factor**-0.5)
+    scale["xyz".index(axis)] = factor
+    return lambda p: p * scale
 
 
 def bump(middle, radius, way):
@@ -204,8 +198,8 @@ def fish():
              capsule((-0.1, 0.2, 0), (0.1, 0.17, 0), 0.08, (1, 1, 2.5))]
     wave = lambda amount, phase: lambda p: p + (amount * np.sin(5 * p[:, 0] + phase) * smooth((0.3 - p[:, 0]) / 0.8))[:, None] * (0, 0, 1)
     poses = {"left": bend("x", "z", 60, -0.5, 0.8), "right": bend("x", "z", -60, -0.5, 0.8), "s": wave(0.12, 0),
-             "s back": wave(-0.12, 0), "puff": bump(np.zeros(3), 0.25, (0, 0, 0.0)), "roll": twist("x", 50, -0.5, 0.8)}
-    poses["puff"] = lambda p: p * (1 + 0.3 * np.exp(-((p / 0.3) ** 2).sum(1)))[:, None]
+             "s back": wave(-0.12, 0), "puff": lambda p: p * (1 + 0.3 * np.exp(-((p / 0.3) ** 2).sum(1)))[:, None],
+             "roll": twist("x", 50, -0.5, 0.8)}
     return union(*parts), ((-0.78, -0.32, -0.2), (0.52, 0.32, 0.2)), poses, None
 
 
@@ -291,10 +285,8 @@ def write_surface(name, path):
 def errors_of(bundle):
     """Of each pose its error settled, over its displacement."""
     with h5py.File(bundle) as file:
-        examples = [group for group in file["examples"].values() if isinstance(group, h5py.Group)]
-        read = lambda group, name: group[name][()] if name in group else group.attrs[name]
-        name_of = lambda group: str(group.name).rsplit("/", 1)[-1]
-        return {name_of(group): float(read(group, "settled_error")) for group in examples if not read(group, "is_rest")}
+        examples = {name: group.attrs for name, group in file["examples"].items() if isinstance(group, h5py.Group)}
+        return {name: float(example["settled_error"]) for name, example in examples.items() if not example["is_rest"]}
 
 
 def bundle(folder, programs, source, way, scene=None):

@@ -241,7 +241,7 @@ bool RigidMesh::may_be_within(const Eigen::Vector3d& point, double radius) const
   return nearest(point).distance <= radius;
 }
 
-/// Of a shell by its sides and by capsules about the edges.
+/// A shell is entered by its sides or by capsules about its edges.
 std::optional<double> RigidMesh::entry_of(const Face& face, const Ray& ray) const noexcept {
   const auto& [a, b, c] = face.corners;
   const double facing = face.normal.dot(ray.direction), half = 0.5 * thickness_;

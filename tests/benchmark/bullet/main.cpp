@@ -1,11 +1,11 @@
 // The same bodies by exmat and by Bullet's btReducedDeformableBody, in turns: a table for docs/comparison.md.
 #include <algorithm>
-#include <ctime>
 #include <fmt/format.h>
 #include <functional>
 #include <vector>
 
 #include "tests/benchmark/bullet/bullet_bodies.h"
+#include "tests/benchmark/thread_clock.h"
 #include "tests/runtime/sim/world/touching_blocks.h"
 
 namespace exmat::benchmarks {
@@ -27,20 +27,13 @@ struct Case {
   bool floor = true;
 };
 
-/// Time of this thread: both take steps in one alone.
-double processor_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-/// Microseconds of one body's step, of each round.
+/// Microseconds of one body's step, of each round; all steps are taken in this thread alone.
 struct Times {
   std::vector<double> each;
   void add(int bodies, const std::function<void()>& step) {
-    const double start = processor_seconds();
+    const double start = thread_seconds();
     for (int i = 0; i < kStepsOfRound; ++i) step();
-    each.push_back(1e6 * (processor_seconds() - start) / (kStepsOfRound * bodies));
+    each.push_back(1e6 * (thread_seconds() - start) / (kStepsOfRound * bodies));
   }
   double median() {
     std::nth_element(each.begin(), each.begin() + kRounds / 2, each.end());

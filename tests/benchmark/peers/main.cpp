@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <ctime>
 #include <exmat/exmat.hpp>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -11,15 +10,9 @@
 #include <string>
 #include <vector>
 
-namespace {
+#include "tests/benchmark/thread_clock.h"
 
-double processor_seconds() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
-}  // namespace
+using exmat::benchmarks::thread_seconds;
 
 int main(int argc, char** argv) {
   if (argc != 4) {
@@ -33,9 +26,9 @@ int main(int argc, char** argv) {
     std::vector<float> xyz(static_cast<std::size_t>(3 * vertices.size()));
     std::vector<std::string> seconds, ways;
     for (int frame = 0; frame < std::atoi(argv[2]); ++frame) {
-      const double start = processor_seconds();
+      const double start = thread_seconds();
       world.step(std::atoi(argv[3]), 1);
-      seconds.push_back(fmt::format("{:.9f}", processor_seconds() - start));
+      seconds.push_back(fmt::format("{:.9f}", thread_seconds() - start));
       if (ids.size() > 1) continue;
       world.body(ids.front()).read_positions(vertices, std::span(xyz));
       ways.push_back(fmt::format("[{:.7g}]", fmt::join(xyz, ",")));

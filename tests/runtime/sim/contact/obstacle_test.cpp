@@ -5,24 +5,19 @@
 #include <gtest/gtest.h>
 #include <numbers>
 
+#include "tests/support/named_shapes.h"
 #include "tests/support/random.h"
 
 namespace exmat::runtime {
 namespace obstacle_test {
 
+using test::kBox;
+using test::kCapsule;
+using test::kPlane;
+using test::kSphere;
+using test::kTurn;
+using test::NamedShape;
 using test::random_vector;
-
-const Eigen::Matrix3d kTurn = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
-const Box kBox{{0.1, -0.2, 0.3}, {0.5, 0.2, 0.8}, kTurn};
-const Capsule kCapsule{{-0.3, 0.1, 0}, {0.5, 0.4, -0.2}, 0.25};
-const Sphere kSphere{{0.1, 0.2, -0.1}, 0.6};
-const Plane kPlane{{0, 0.1, 0}, Eigen::Vector3d(1, 2, -1).normalized()};
-
-struct NamedShape {
-  const char* name;
-  Shape shape;
-};
-void PrintTo(const NamedShape& shape, std::ostream* stream) { *stream << shape.name; }
 
 class EachShape : public ::testing::TestWithParam<NamedShape> {};
 INSTANTIATE_TEST_SUITE_P(Shapes, EachShape,

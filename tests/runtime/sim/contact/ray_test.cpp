@@ -5,15 +5,20 @@
 #include <memory>
 
 #include "runtime/sim/contact/obstacle.h"
+#include "tests/support/named_shapes.h"
 #include "tests/support/random.h"
 #include "tests/support/surfaces.h"
 
 namespace exmat::runtime {
 namespace ray_test {
 
+using test::kBox;
+using test::kCapsule;
+using test::kPlane;
+using test::kSphere;
+using test::kTurn;
+using test::NamedShape;
 using test::random_vector;
-
-const Eigen::Matrix3d kTurn = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, -2, 0.5).normalized()).toRotationMatrix();
 
 /// A dented ball: closed without a thickness, else a shell that lacks some triangles.
 MeshShape dented_ball(double thickness) {
@@ -32,19 +37,10 @@ HeightFieldShape ground() {
   return {std::make_shared<HeightField>(heights, Eigen::Vector2d(0.2, 0.25)), {-1, -1, 0.1}, kTurn};
 }
 
-struct NamedShape {
-  const char* name;
-  Shape shape;
-};
-void PrintTo(const NamedShape& shape, std::ostream* stream) { *stream << shape.name; }
-
 class RayInto : public ::testing::TestWithParam<NamedShape> {};
 INSTANTIATE_TEST_SUITE_P(Shapes, RayInto,
-                         ::testing::Values(NamedShape{"plane",
-                                                      Plane{{0, 0.1, 0}, Eigen::Vector3d(1, 2, -1).normalized()}},
-                                           NamedShape{"sphere", Sphere{{0.1, 0.2, -0.1}, 0.6}},
-                                           NamedShape{"box", Box{{0.1, -0.2, 0.3}, {0.5, 0.2, 0.8}, kTurn}},
-                                           NamedShape{"capsule", Capsule{{-0.3, 0.1, 0}, {0.5, 0.4, -0.2}, 0.25}},
+                         ::testing::Values(NamedShape{"plane", kPlane}, NamedShape{"sphere", kSphere},
+                                           NamedShape{"box", kBox}, NamedShape{"capsule", kCapsule},
                                            NamedShape{"mesh", dented_ball(0)}, NamedShape{"shell", dented_ball(0.15)},
                                            NamedShape{"ground", ground()}),
                          [](const auto& shape) { return shape.param.name; });
