@@ -97,7 +97,7 @@ CLI::App& add_check(CLI::App& app, CheckOptions& options) {
 }
 
 CLI::App& add_mesh(CLI::App& app, MeshCommandOptions& options) {
-  CLI::App& command = *app.add_subcommand("mesh", "enclose a surface with tets, write these and what they are like");
+  CLI::App& command = *app.add_subcommand("mesh", "fill a surface with tets, write these and what they are like");
   command.add_option("SURFACE", options.surface, "surface (.glb, .gltf, .obj, .ply, .stl)")->required();
   command.add_option("-o,--output", options.mesh, "mesh to write (Gmsh .msh)")->required();
   auto* cells = command.add_option("--cells", options.settings.cells, "about so many tets")

@@ -289,7 +289,7 @@ void ExampleReader::read_rest() {
   if (input_.object_is_rest && name_is_taken) input_.rest.name = "object_rest";
 }
 
-// Tets of a file, or those that enclose a surface of its own.
+// Tets of a file, or those that fill a surface of its own.
 MeshFile ExampleReader::read_tets(const ExampleConfig& example) {
   if (!example.surface) return read_recorded(example.mesh, asset_, files_);
   const SurfaceFile surface = read_recorded_surface(*example.surface, asset_, files_);

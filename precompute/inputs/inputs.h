@@ -28,7 +28,7 @@ struct ObjectInput {
   std::vector<std::vector<std::int64_t>> pushed;       ///< vertices of each of the forces of basis.loads
   std::optional<SkeletonData> skeleton{};              ///< bones that it hangs on, for the vertices of the mesh
   std::vector<std::string> warnings{};                 ///< warnings of its bones
-  std::shared_ptr<const ObjectSurface> surface{};      ///< that the mesh encloses; none where tets were given
+  std::shared_ptr<const ObjectSurface> surface{};      ///< that the mesh fills; none where tets were given
   VertexMarks marks{};                                 ///< marks of that surface at the vertices
 };
 

@@ -15,10 +15,10 @@
 
 namespace exmat::precompute {
 
-/// A surface in place of tets: the cage about it, what is nearest to which of its parts, and its poses.
+/// A surface in place of tets: its cage, what is nearest to which of its parts, and its poses.
 class ObjectSurface {
  public:
-  /// Reads the surface that the asset names and encloses it.
+  /// Reads the surface that the asset names and fills it.
   ObjectSurface(const AssetConfig& asset, InputFiles& files, StageCache& cache);
 
   const SurfaceFile& file() const { return file_; }
@@ -58,7 +58,7 @@ class ObjectSurface {
   SurfaceTree tree_;
 };
 
-/// Tets that enclose a surface of other vertices than the object's, with what settings the asset has for its own.
+/// Tets that fill a surface of other vertices than the object's, with what settings the asset has for its own.
 TetMesh cage_of(const SurfaceMesh& surface, const AssetConfig& asset, const std::string& name, StageCache& cache);
 
 /// The vertices of a morph target of a surface. Throws InputError that names those that it has.

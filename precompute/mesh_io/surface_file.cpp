@@ -59,7 +59,7 @@ void log_notes(const SurfaceFile& surface, const std::filesystem::path& file) {
 void warn_of_flat_body(const SurfaceMesh& surface, const std::filesystem::path& file) {
   if (!is_flat(surface.vertices)) return;
   log::warning(
-      fmt::format("{}: the surface is flat: as a body it is a sheet as thick as the cells that enclose it; give it a "
+      fmt::format("{}: the surface is flat: as a body it is a sheet as thick as the cells that fill it; give it a "
                   "thickness, and "
                   "scale no object by 0",
                   file.string()));

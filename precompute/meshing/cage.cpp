@@ -2,8 +2,10 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <fmt/format.h>
+#include <iterator>
 #include <map>
 #include <numbers>
 #include <utility>
@@ -22,27 +24,31 @@
 namespace exmat::precompute {
 namespace {
 
-// Gaps and hollows narrower than a cell are bridged; the cage stands off the surface by about a fifth of one.
-constexpr double kAlpha = 1, kOffset = 0.2;
-// Trials: to find the cell size of a number of tets; to get all of the surface inside and no flat tet.
-constexpr int kSizeTrials = 6, kShapeTrials = 8;
+// Gaps and hollows narrower than `alpha` are bridged by a wrap that stands off the surface by `offset`, from which the
+// tets' surface is by `deviation` at most: all over the cell size.
+struct Fit {
+  double alpha, offset, deviation;
+};
+// A cage follows the surface, half of whose vertices are within, so that it has the surface's volume.
+constexpr std::array<Fit, 3> kFollowing = {{{0.5, 0.05, 0.2}, {0.5, 0.1, 0.2}, {0.5, 0.15, 0.15}}};
+// What is thinner than a cell is filled by tets that stand off, more at each trial.
+constexpr Fit kStandingOff{1, 0.2, 0.1};
+constexpr double kFartherOff = 1.3;
+constexpr int kShapeTrials = 11;
+// Trials to find the cell size of a number of tets.
+constexpr int kSizeTrials = 6;
 // Cages that are made where the first has too many or too few tets.
 constexpr int kCountRounds = 4;
 // Tets grow as this power of the size, between those of a sheet and of a solid.
 constexpr double kUsualPower = 2.5;
-// Factor by which the cage stands off more at each trial.
-constexpr double kFartherOff = 1.3;
-// Rounds of drawing the cage out over vertices that stick out of it, and how much farther than they stick out.
-constexpr int kDrawingRounds = 30;
-constexpr double kDrawnFarther = 1.1;
+// Vertices of the surface are no farther out of the cage, over the cell size.
+constexpr double kOutside = 0.75;
 // A number of tets is met by so much.
 constexpr double kCountTolerance = 0.1;
 // Cell sizes over the diagonal that are tried at most: one cell for all, ten million.
 constexpr double kLargestSize = 0.5, kSmallestSize = 0.002;
 // Twice the area of a triangle that has none, over the diagonal's square: rounding of corners on one line.
 constexpr double kNoArea = 1e-14;
-// A vertex is inside when it is no farther out, over the diagonal: rounding.
-constexpr double kInside = 1e-9;
 // Places at diagonal 1 are multiples of this (2^-40): a surface in another unit has the same ones, to the last bit.
 constexpr double kGrid = 0x1p-40;
 
@@ -127,6 +133,14 @@ bool is_closed(const TriangleArray& triangles) {
   return std::ranges::all_of(balance, [](const auto& edge) { return edge.second == 0; });
 }
 
+constexpr int kClose = std::ssize(kFollowing);
+
+Fit fit_of(int trial) {
+  if (trial < kClose) return kFollowing[static_cast<std::size_t>(trial)];
+  const double farther = std::pow(kFartherOff, trial - kClose);
+  return {kStandingOff.alpha, farther * kStandingOff.offset, farther * kStandingOff.deviation};
+}
+
 class CageMaker {
  public:
   CageMaker(const UnitSurface& surface, const std::string& name)
@@ -134,33 +148,41 @@ class CageMaker {
 
   /// About so many tets; `size` becomes that of their cells.
   TetMesh of_count(int cells, double& size) const;
-  /// `offset`, over the size, is that of the first trial and becomes that of the cage.
-  TetMesh shape(double size, double& offset) const;
+  /// `trial` is the first and becomes the one that gave the cage.
+  TetMesh shape(double size, int& trial) const;
 
  private:
   double size_for(int cells) const;
-  TetMesh tets(double size, double offset, unsigned seed, bool improve) const;
-  bool draw_out(TetMesh& mesh) const;
-  std::string fault_of(TetMesh& mesh) const;
+  TetMesh tets(double size, const Fit& fit, unsigned seed, bool improve) const;
+  Eigen::Index first_count(double size) const;
+  bool is_covered(const TetMesh& mesh, double size) const;
+  std::string fault_of(TetMesh& mesh, double size) const;
 
   const UnitSurface& surface_;
   const std::string& name_;
   bool connected_;
 };
 
-TetMesh CageMaker::tets(double size, double offset, unsigned seed, bool improve) const {
+// None where the mesher finds nothing to fill.
+TetMesh CageMaker::tets(double size, const Fit& fit, unsigned seed, bool improve) const {
   TetMesh mesh;
   std::string failure;
-  mesher_module().make_tets(
-      {surface_.mesh.vertices, surface_.mesh.triangles, kAlpha * size, offset * size, size, seed, improve}, mesh,
-      failure);
+  mesher_module().make_tets({surface_.mesh.vertices, surface_.mesh.triangles, fit.alpha * size, fit.offset * size,
+                             fit.deviation * size, size, seed, improve},
+                            mesh, failure);
   if (!failure.empty()) throw WorkError(fmt::format("{}: the mesher failed: {}", name_, failure));
-  if (mesh.tet_count() == 0) throw WorkError(fmt::format("{}: the mesher found nothing to fill", name_));
   return mesh;
 }
 
 // Keeps few digits: the last ones of roots and powers differ between machines, and a mesh follows from every bit.
 double tried_size(double size) { return std::round(std::clamp(size, kSmallestSize, kLargestSize) * 1e5) / 1e5; }
+
+// Tets of a first mesh that follows the surface, or of one that stands off where that has none.
+Eigen::Index CageMaker::first_count(double size) const {
+  for (int trial = 0; trial <= kClose; ++trial)
+    if (const Eigen::Index count = tets(size, fit_of(trial), 0, false).tet_count(); count > 0) return count;
+  throw WorkError(fmt::format("{}: the mesher found nothing to fill", name_));
+}
 
 // The number of tets grows as a power of the cell size between 2 (sheets) and 3 (solids), and more where fine cells
 // reach what coarse ones bridge: a secant in logarithms.
@@ -169,7 +191,7 @@ double CageMaker::size_for(int cells) const {
   double best = size, best_miss = INFINITY, power = kUsualPower;
   double last_size = 0, last_count = 0;
   for (int trial = 0; trial < kSizeTrials; ++trial) {
-    const auto count = static_cast<double>(tets(size, kOffset, 0, false).tet_count());
+    const auto count = static_cast<double>(first_count(size));
     log::debug(fmt::format("{}: {} tets for cells of {} of the diagonal", name_, count, size));
     const double miss = std::abs(std::log(count / cells));
     if (miss < best_miss) std::tie(best, best_miss) = std::pair(size, miss);
@@ -184,45 +206,28 @@ double CageMaker::size_for(int cells) const {
   return best;
 }
 
-// Moves outer vertices of the tets outwards until no vertex of the surface is outside; false where some still are.
-bool CageMaker::draw_out(TetMesh& mesh) const {
-  for (int round = 0; round < kDrawingRounds; ++round) {
-    const BarycentricPoints points = nearest_points(mesh, surface_.mesh.vertices);
-    if (points.distances.maxCoeff() <= kInside) return true;
-    VertexArray push = VertexArray::Zero(mesh.vertex_count(), 3);
-    for (Eigen::Index k = 0; k < points.tets.size(); ++k) {
-      if (points.distances[k] <= kInside) continue;
-      const Eigen::RowVector4d weights = points.weights.row(k);
-      const Eigen::RowVector3d missing = surface_.mesh.vertices.row(k) - weights * tet_positions(mesh, points.tets[k]);
-      for (int corner = 0; corner < 4; ++corner) {
-        const Eigen::RowVector3d move = kDrawnFarther * weights[corner] / weights.squaredNorm() * missing;
-        auto pushed = push.row(mesh.tets(points.tets[k], corner));
-        if (move.norm() > pushed.norm()) pushed = move;
-      }
-    }
-    mesh.vertices += push;
-  }
-  return false;
+bool CageMaker::is_covered(const TetMesh& mesh, double size) const {
+  return nearest_points(mesh, surface_.mesh.vertices).distances.maxCoeff() <= kOutside * size;
 }
 
-// Draws the mesh out over the surface, and says what keeps it from being a cage, if anything does.
-std::string CageMaker::fault_of(TetMesh& mesh) const {
-  if (!draw_out(mesh)) return "vertices of the surface outside";
+// What keeps the mesh from being a cage, if anything does.
+std::string CageMaker::fault_of(TetMesh& mesh, double size) const {
+  if (mesh.tet_count() == 0) return "nothing to fill";
   const double angle = tet_volumes(mesh).minCoeff() > 0 ? dihedral_angles(mesh).first : 0;
   if (angle < kLeastDihedralAngle) return fmt::format("a dihedral angle of {:.1f} degrees", angle);
+  if (!is_covered(mesh, size)) return "vertices of the surface far outside";
   if (!connected_) return "";
   TetMesh copy = mesh;
   const bool falls_apart = check_mesh(copy, name_, {.drop_smaller_components = true}).dropped_components > 0;
   return falls_apart ? "several components" : "";
 }
 
-TetMesh CageMaker::shape(double size, double& offset) const {
+TetMesh CageMaker::shape(double size, int& trial) const {
   std::string why;
-  for (int trial = 0; trial < kShapeTrials; ++trial) {
-    TetMesh mesh = tets(size, offset, static_cast<unsigned>(trial), true);
-    why = fault_of(mesh);
+  for (; trial < kShapeTrials; ++trial) {
+    TetMesh mesh = tets(size, fit_of(trial), static_cast<unsigned>(trial), true);
+    why = fault_of(mesh, size);
     if (why.empty()) return mesh;
-    offset *= kFartherOff;
     log::debug(fmt::format("{}: cage {} has {}; another trial", name_, trial + 1, why));
   }
   throw WorkError(
@@ -232,9 +237,9 @@ TetMesh CageMaker::shape(double size, double& offset) const {
 // A cage that has to stand farther off the surface than the trials of size_for() has fewer tets than these.
 TetMesh CageMaker::of_count(int cells, double& size) const {
   TetMesh best;
-  double best_miss = INFINITY, tried = size_for(cells), offset = kOffset;
-  for (int round = 0; round < kCountRounds && best_miss > kCountTolerance; ++round) {
-    TetMesh mesh = shape(tried, offset);
+  double best_miss = INFINITY, tried = size_for(cells);
+  for (int round = 0, trial = 0; round < kCountRounds && best_miss > kCountTolerance; ++round) {
+    TetMesh mesh = shape(tried, trial);
     const double miss = std::log(static_cast<double>(mesh.tet_count()) / cells);
     if (std::abs(miss) < best_miss) {
       best = std::move(mesh);
@@ -259,7 +264,7 @@ void require_one_body(TetMesh& mesh, const std::string& name) {
     check_mesh(mesh, name, {});
   } catch (const InputError& error) {
     Complaint complaint = error.complaint();
-    complaint.place = "the tets that enclose the surface";
+    complaint.place = "the tets that fill the surface";
     complaint.advice =
         "join the parts of the surface, leave the others out, or ask for larger cells, which bridge the gaps";
     throw InputError(std::move(complaint));
@@ -283,10 +288,11 @@ Cage make_cage(const SurfaceMesh& surface, const CageSettings& settings, const s
   const UnitSurface unit = unit_surface(surface, name);
   require_settings(settings, unit.diagonal, name);
   const CageMaker maker(unit, name);
-  double size = settings.cell_size.value_or(0) / unit.diagonal, offset = kOffset;
+  double size = settings.cell_size.value_or(0) / unit.diagonal;
+  int trial = 0;
   Cage cage;
   cage.mesh =
-      settings.cell_size ? maker.shape(size, offset) : maker.of_count(settings.cells.value_or(kDefaultCells), size);
+      settings.cell_size ? maker.shape(size, trial) : maker.of_count(settings.cells.value_or(kDefaultCells), size);
   cage.farthest = 0;
   const SurfaceTree tree(unit.mesh.vertices, unit.mesh.triangles);
   const TriangleArray outer = surface_triangles(cage.mesh.tets);

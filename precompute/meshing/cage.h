@@ -17,7 +17,7 @@ struct CageSettings {
 /// Tets that 30 modes need, as a rule: docs/surfaces.md.
 constexpr int kDefaultCells = 2000;
 
-/// Tets that enclose a surface.
+/// Tets that fill a surface and follow it from without and within.
 struct Cage {
   TetMesh mesh;                               ///< one component, sound (common/mesh/checks.h)
   double cell_size = 0;                       ///< [m]
@@ -38,11 +38,12 @@ void pass_members(Archive& archive, Cage& cage) {
 /// Smallest dihedral angle that a cage may have [degree].
 constexpr double kLeastDihedralAngle = 10;
 
-/// Encloses a surface with tets, whatever holes, crossings, doubled or flipped triangles it has: 3D alpha wrapping
+/// Fills a surface with tets, whatever holes, crossings, doubled or flipped triangles it has: 3D alpha wrapping
 /// (Portaner et al. 2022), Delaunay refinement (Jamin et al. 2015), perturbing and exuding. The same surface gives the
-/// same cage. All vertices of triangles are in the cage. `name` of the surface is for messages. Throws InputError where
-/// the surface has no extent or falls apart in several bodies, or there is no mesher; WorkError where none of several
-/// trials gives a sound cage.
+/// same cage. Where the surface is no thinner than a cell, the cage has its volume; vertices of triangles are outside
+/// by 3/4 of the cell size at most. `name` of the surface is for messages. Throws InputError where the surface has no
+/// extent or falls apart in several bodies, or there is no mesher; WorkError where none of several trials gives a sound
+/// cage.
 Cage make_cage(const SurfaceMesh& surface, const CageSettings& settings, const std::string& name);
 
 /// "CGAL 5.5.1", or "none" where the module with the mesher is not there.

@@ -4,6 +4,7 @@
 #include <CGAL/Mesh_complex_3_in_triangulation_3.h>
 #include <CGAL/Mesh_criteria_3.h>
 #include <CGAL/Mesh_triangulation_3.h>
+#include <CGAL/Polygon_mesh_processing/measure.h>
 #include <CGAL/Polyhedral_mesh_domain_3.h>
 #include <CGAL/Surface_mesh.h>
 #include <CGAL/alpha_wrap_3.h>
@@ -94,9 +95,6 @@ using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;
 using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 using exmat::precompute::MesherRequest;
 
-// Distance of the surface's triangles from the wrap, over the offset: less than 1, so that tets enclose what the wrap
-// encloses.
-constexpr double kSurfaceDistance = 0.5;
 // Smallest angle of a triangle on the surface [degree]; Mesh_3 ends for those below 30.
 constexpr double kFacetAngle = 25;
 // Circumscribed sphere over shortest edge; Mesh_3 ends for those above 2.
@@ -161,8 +159,8 @@ exmat::TetMesh fill(const Wrap& wrap, const MesherRequest& request, double grid)
   CGAL::get_default_random() = CGAL::Random(request.seed);
   const Domain domain(wrap, grid, random);
   const Criteria criteria(params::facet_angle = kFacetAngle, params::facet_size = request.cell_size,
-                          params::facet_distance = kSurfaceDistance * request.offset,
-                          params::cell_radius_edge_ratio = kRadiusEdgeRatio, params::cell_size = request.cell_size);
+                          params::facet_distance = request.deviation, params::cell_radius_edge_ratio = kRadiusEdgeRatio,
+                          params::cell_size = request.cell_size);
   if (!request.improve)
     return tets_of(CGAL::make_mesh_3<Complex>(domain, criteria, params::no_perturb(), params::no_exude()));
   // No time limits: the mesh must not depend on the machine's speed.
@@ -173,8 +171,15 @@ exmat::TetMesh fill(const Wrap& wrap, const MesherRequest& request, double grid)
   return tets_of(complex);
 }
 
+// That of a plate of the same volume and area; half that of a rod.
+double thickness(const Wrap& wrap) {
+  return 2 * CGAL::to_double(CGAL::Polygon_mesh_processing::volume(wrap)) /
+         CGAL::to_double(CGAL::Polygon_mesh_processing::area(wrap));
+}
+
 exmat::TetMesh make_tets(const MesherRequest& request) {
   const Wrap wrap = wrap_of(request);
+  if (thickness(wrap) < 2 * request.deviation) return {};
   exmat::TetMesh mesh = fill(wrap, request, 0);
   return covers(mesh, wrap, request.cell_size) ? mesh : fill(wrap, request, request.cell_size);
 }
