@@ -509,11 +509,12 @@ FullStep::Outcome FullStep::find_direction(double tolerance) noexcept {
   return Outcome::kFound;
 }
 
-// Damping by a stiffness that had to be projected would feed energy in.
+// Damping by a stiffness that had to be projected would feed energy in, whichever iterate shows that it has to be: of
+// an indefinite one the potential has no minimum.
 void FullStep::project() noexcept {
-  ++report_.projections;
+  const bool is_first = report_.projections++ == 0;
   projected_ = tangents_are_current_ = true;
-  potential_.evaluate_elements(workspace_.d, FullPotential::Tangents::kProjected, at_first_iterate_);
+  potential_.evaluate_elements(workspace_.d, FullPotential::Tangents::kProjected, is_first);
   here_ = potential_.gradient_there(workspace_.d, workspace_.gradient);
 }
 
