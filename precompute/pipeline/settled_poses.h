@@ -44,8 +44,8 @@ struct SettledPose {
 /// the rest pose, and puts the errors into the examples. `load`: absent, only the best is looked for. Where the load is
 /// to be compensated, the targets of the whole body's examples are shifted first. A force of another stiffness k
 /// settles at q with the force k (g - P_s q), g the target's pull and P_s the filter; with g' = P_s q + k/kappa (g -
-/// P_s q) the stiffness kappa has the same force there. k is what leaves the least error. Throws InputError where there
-/// is no table to shift.
+/// P_s q) the stiffness kappa has the same force there. k is, of each example, what leaves the least error. Throws
+/// InputError where there is no table to shift.
 std::vector<SettledPose> settle_examples(const BodyStages& stages, const std::optional<SettlingLoad>& load,
                                          ReducedModel& model);
 
