@@ -222,7 +222,9 @@ SettledPose PoseSettler::settle(Eigen::Index group, Eigen::Index k) const {
   if (!found.settles) return found;
   found.eigenfunctions = norm(in_basis - *best) / size;
   found.force = norm(*shape - *best) / size;
-  if (found.force > std::max(found.basis, found.eigenfunctions))
+  const bool by_force = found.force > std::max(found.basis, found.eigenfunctions);
+  found.unheld = by_force && load_.compensate && found.region.empty();
+  if (by_force && !found.unheld)
     found.stronger = error(pose.given, settled_shape(loaded, group, k, kNextStrength * stiffness, load_.gravity));
   const Eigen::VectorXd off = *shape - pose.given;
   const Eigen::VectorXd distances = off.reshaped<Eigen::RowMajor>(off.size() / 3, 3).rowwise().norm();
@@ -333,6 +335,8 @@ std::string advice_on(const SettledPose& pose) {
   if (pose.stronger)
     return fmt::format("; ten times examples.stiffness would leave {:.1f} %{}", 100 * *pose.stronger,
                        pose.compensable ? ", examples.compensate about what is best" : "");
+  if (pose.unheld)
+    return "; so weak a force does not hold the pose: raise examples.stiffness, and make the bundle for that";
   if (pose.eigenfunctions > pose.basis)
     return "; more shape_space.eigenfunctions, or a shape_space.tolerance, would hold more of the pose";
   if (2 * pose.clamp > pose.basis)

@@ -35,6 +35,7 @@ struct SettledPose {
   std::optional<double>
       stronger;  ///< error under the load with ten times the stiffness, where that is the largest part
 
+  bool unheld = false;       ///< that is the largest part although targets are compensated
   bool compensable = false;  ///< examples.compensate would bring the error to about the best, and is off
 
   double error() const { return loaded.value_or(best); }

@@ -139,6 +139,8 @@ TEST_F(SettledPoses, AreCompensatedEachByItself) {
   fmt::print("bend {:.4f} alone, {:.4f} beside crush, which settles at {:.4f}, best {:.4f}\n", alone,
              both[2].settled_error, both[1].settled_error, both[1].best_error);
   EXPECT_NEAR(both[2].settled_error, alone, 0.01);
+  EXPECT_THAT(made.errors, HasSubstr("so weak a force does not hold the pose: raise examples.stiffness"));
+  EXPECT_EQ(made.errors.find("ten times examples.stiffness"), std::string::npos) << "of targets for another";
 }
 
 // The force of a few eigenfunctions takes the body all of the way, since its basis holds the pose as it was given.
