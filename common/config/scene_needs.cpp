@@ -40,9 +40,8 @@ void require_weights(const SceneConfig& scene, const std::vector<Eigen::Index>& 
 
 void require_uncompensated(const SceneConfig& scene) {
   if (!scene.examples || !scene.examples->compensate) return;
-  throw InputError({scene.file.string(), scene.place + "/examples/compensate",
-                    "no such member of a body on bones, or whose clamp follows examples", "true",
-                    "its targets are those of its modes, in which it does not step: leave compensate out"});
+  throw InputError({scene.file.string(), scene.place + "/examples/compensate", "no such member of a body on bones",
+                    "true", "its targets are those of its modes, in which it does not step: leave compensate out"});
 }
 
 Needs needs_of(const SceneConfig& scene) {

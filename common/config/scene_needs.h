@@ -29,7 +29,7 @@ void require_obstacle_files(const SceneConfig& scene);
 /// `examples` has their numbers, of the whole body's force, if there is one, then of the regions'.
 void require_weights(const SceneConfig& scene, const std::vector<Eigen::Index>& examples);
 
-/// Throws InputError where the scene, of a body on bones or whose clamp follows examples, has examples.compensate.
+/// Throws InputError where the scene, of a body on bones, has examples.compensate.
 void require_uncompensated(const SceneConfig& scene);
 
 /// Needs of a scene from its bundle.

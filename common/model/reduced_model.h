@@ -282,6 +282,9 @@ struct SkeletonData {
   RowMatrix poses;  ///< F b x 7 (dataset F b 7), joint [m] and turn from the bind pose, a quaternion, w first
   /// K n x 3 (dataset K n 3), where each example moves the vertices before the bones do, by its weight [m]; or empty.
   RowMatrix shifts = RowMatrix(0, 3);
+
+  /// True if it is that of a clamp which follows examples, and has no bones beside.
+  bool is_clamp() const { return shifts.rows() > 0 && bones.size() == 1; }
 };
 
 /// Everything a scene may need of one asset. Absent groups were left out (docs/overview.md).

@@ -168,15 +168,15 @@ void require_kinds(const BundleOptions& options) {
 /// Sets `model` where it makes one.
 void make_bundle(const BundleOptions& options, RunReport& report, std::optional<ReducedModel>& model) {
   check_files(options);
-  const AssetConfig asset = asset_from(options.asset, options.write_asset);
   std::optional<SceneConfig> scene;
   if (!options.scene.empty()) scene = load_scene(options.scene);
+  const SceneConfig* const loads = scene ? &*scene : nullptr;
+  const AssetConfig asset = asset_from(options.asset, options.write_asset, loads);
   claim_outputs(options, asset, scene);
   require_kinds(options);
-  if (!options.write_asset.empty()) write_assumed_asset(options.asset, options.write_asset);
+  if (!options.write_asset.empty()) write_assumed_asset(options.asset, options.write_asset, loads);
   const Needs needs = precompute::resolve_needs(asset, scene_needs(options, scene, asset));
-  const precompute::BuildOptions build{options.alignment_report, options.cache, scene ? &*scene : nullptr,
-                                       options.training_budget};
+  const precompute::BuildOptions build{options.alignment_report, options.cache, loads, options.training_budget};
   if (options.if_changed && is_up_to_date(options, asset, needs, build, report.build)) {
     log::info(fmt::format("{}: its inputs have not changed, nothing to do", options.bundle));
     write_depfile(options, report.build);

@@ -43,7 +43,9 @@ void new_command(const NewCommandOptions& options) {
   write_file_atomically(scene_file, scene.dump(2) + "\n");
   const std::size_t examples = asset.contains("examples") ? asset["examples"].size() : 0;
   log::info(fmt::format("{}: {} poses, {}", surface.string(), examples,
-                        asset["object"].contains("fixed") ? "clamped at _FIXED" : "a free body above a floor"));
+                        !asset["object"].contains("fixed")            ? "a free body above a floor"
+                        : asset["object"]["fixed"].contains("follow") ? "clamped at _FIXED, which follows the poses"
+                                                                      : "clamped at _FIXED"));
   const auto path = [&](const std::string& file) { return (folder / file).string(); };
   fmt::print("{} and {} are written. Run\n\n", asset_file.string(), scene_file.string());
   fmt::print("  exmat-precompute bundle {} --scene {} -o {}\n", asset_file.string(), scene_file.string(),

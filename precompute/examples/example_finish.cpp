@@ -82,15 +82,23 @@ PoseFitter::PoseFitter(const AssetConfig& asset, const ObjectInput& object, cons
   }
   solver.reset();  // factors are the most of the memory: the clamp has its own
   for (std::size_t i = 0; i < poses_.size(); ++i) {
-    if (stage.groups[i].region.empty())
-      poses_[i] = whole_body_poses(stage.object, stage.weights, object.fixed, FieldClamp(system, highest, asset.name));
-    fields_.emplace_back(poses_[i] * changes_from_rest(stage.groups[i].examples));
+    const ExampleGroup& group = stage.groups[i];
+    held_.emplace_back();
+    if (group.region.empty()) {
+      const FieldClamp clamp(system, highest, asset.name);
+      poses_[i] = whole_body_poses(stage.object, stage.weights, object.fixed, clamp);
+      Eigen::MatrixXd given = group.fields;
+      hold_fixed_mean(object.fixed, given);
+      if (asset.pose_tolerance) held_.back() = clamp.apply(given);
+    }
+    fields_.emplace_back(poses_[i] * changes_from_rest(group.examples));
+    if (held_.back().size() == 0) held_.back() = fields_.back();
   }
 }
 
 Eigen::MatrixXd PoseFitter::fields() const {
   Eigen::MatrixXd fields(system_.mass.rows(), 0);
-  for (const Eigen::MatrixXd& more : fields_) {
+  for (const Eigen::MatrixXd& more : held_) {
     fields.conservativeResize(Eigen::NoChange, fields.cols() + more.cols());
     fields.rightCols(more.cols()) = more;
   }

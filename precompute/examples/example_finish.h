@@ -24,7 +24,9 @@ class PoseFitter {
   PoseFitter(const AssetConfig& asset, const ObjectInput& object, const ElasticSystem& system,
              std::unique_ptr<SemidefiniteSolver> solver, double highest, const ShapeStage& stage);
 
-  /// [f x k] displacements of all poses, groups in order: what the basis is to hold.
+  /// [f x k] displacements of all poses, groups in order: what the basis is to hold. Where the asset has a tolerance of
+  /// poses, those of the whole body are as they were given, with what the m functions lose of them: the force of the
+  /// others moves the body along them.
   Eigen::MatrixXd fields() const;
 
   Eigen::Index groups() const { return std::ssize(poses_); }
@@ -73,6 +75,7 @@ class PoseFitter {
   const ShapeStage& stage_;
   std::vector<Eigen::MatrixXd> poses_;   // f x 3m of unit changes of descriptor, of the groups
   std::vector<Eigen::MatrixXd> fields_;  // f x (K-1), of the groups
+  std::vector<Eigen::MatrixXd> held_;    // likewise, what the basis is to hold of them
 };
 
 }  // namespace exmat::precompute

@@ -19,6 +19,7 @@ namespace exmat::precompute {
 namespace {
 
 constexpr double kDensity = 1000, kGravity = 9.81;  // [kg/m^3], [m/s^2]
+constexpr double kLostByClamp = 0.02;               // share of a pose that a clamp may lose by standing still
 constexpr std::array<const char*, 2> kClamps{"_FIXED", "_PINNED"};
 constexpr std::size_t kLongestName = 64, kMostExamples = 64;  // of schemas/asset.json
 
@@ -49,6 +50,18 @@ bool is_shift(const VertexArray& rest, const VertexArray& posed) {
   const VertexArray moves = posed - rest;
   const double differ = (moves.colwise().maxCoeff() - moves.colwise().minCoeff()).maxCoeff();
   return differ <= 1e-5 * bounding_box_diagonal(rest);
+}
+
+// True if a clamp that stands still loses much of a pose, which is placed by the mean of what it does there.
+bool moves_clamp(const VertexArray& rest, const VertexArray& posed, const FlagVector& fixed) {
+  std::vector<Eigen::Index> clamp;
+  for (Eigen::Index v = 0; v < fixed.size(); ++v)
+    if (fixed[v] != 0) clamp.push_back(v);
+  if (clamp.empty()) return false;
+  const VertexArray moves = posed - rest;
+  const Eigen::RowVector3d mean = moves(clamp, Eigen::all).colwise().mean();
+  const VertexArray placed = moves.rowwise() - mean;
+  return placed(clamp, Eigen::all).norm() > kLostByClamp * placed.norm();
 }
 
 }  // namespace
@@ -90,11 +103,18 @@ Json assumed_asset(const std::filesystem::path& surface, const std::filesystem::
                     {"density", kDensity}}}}},
                 {"shape_space", {{"tolerance", 0.02}}},
                 {"seed", 1}};
-  for (const char* clamp : kClamps)
-    if (file.parts.contains(clamp)) asset["object"]["fixed"] = {{"part", clamp}};
+  const FlagVector* fixed = nullptr;
+  for (const char* clamp : kClamps) {
+    const auto part = file.parts.find(clamp);
+    if (part == file.parts.end()) continue;
+    asset["object"]["fixed"] = {{"part", clamp}};
+    fixed = &part->second;
+  }
   Json examples = Json::array();
   std::vector<std::string> morphs;
+  bool follows = false;
   for (const MorphTarget& morph : file.morphs) {
+    follows = follows || (fixed != nullptr && moves_clamp(file.mesh.vertices, morph.positions, *fixed));
     if (asset["object"].contains("fixed") || !is_shift(file.mesh.vertices, morph.positions))
       morphs.push_back(morph.name);
     else
@@ -105,6 +125,7 @@ Json assumed_asset(const std::filesystem::path& surface, const std::filesystem::
                           surface.string(), morphs.size(), kMostExamples));
     morphs.resize(kMostExamples);
   }
+  if (follows) asset["object"]["fixed"]["follow"] = true;
   const std::vector<std::string> names = example_names(morphs);
   for (std::size_t k = 0; k < names.size(); ++k) examples.push_back({{"name", names[k]}, {"morph", morphs[k]}});
   if (!examples.empty()) asset["examples"] = examples;

@@ -17,8 +17,10 @@ constexpr double kSnapshotAmplitude = 0.25;
 // Principal components below this, relative to the largest singular value, are rounding.
 constexpr double kRankTolerance = 1e-9;
 // Share of an example's displacement that a basis of its own choice of size may lose.
-constexpr double kFieldLoss = 0.05;
-// The same of one that learns from the motions of a scene: more is a pose that they do not show.
+constexpr double kFieldLoss = 0.02;
+// The same of a basis that has modes of its own for what the motions that it learns from do not show.
+constexpr double kShownLoss = 0.005;
+// The same of one of a given size that learns from the motions of a scene: more is a pose that they do not show.
 constexpr double kUnshownLoss = 0.15;
 // Share of modes beside the motions of a scene, in norm.
 constexpr double kUnseenShare = 0.03;
@@ -106,6 +108,16 @@ double largest_loss(const SparseMatrix& mass, const Eigen::MatrixXd& basis, Eige
   return std::sqrt(fields.cwiseProduct(mass * fields).colwise().sum().maxCoeff());
 }
 
+// Adds modes for what it loses of fields of unit norm.
+void add_unshown(const SparseMatrix& mass, Eigen::MatrixXd fields, Eigen::MatrixXd& basis) {
+  remove_components(mass, basis, fields);
+  const Eigen::MatrixXd components = principal_components(mass, fields, fields.cols());
+  Eigen::Index count = 0;
+  while (count < components.cols() && largest_loss(mass, components.leftCols(count), fields) > kShownLoss) ++count;
+  basis.conservativeResize(Eigen::NoChange, basis.cols() + count);
+  basis.rightCols(count) = components.leftCols(count);
+}
+
 // Example fields may take as many modes of a basis.
 Eigen::Index most_fields(int size) { return std::max({1, size / 2, size - kBasisSize / 2}); }
 
@@ -137,7 +149,8 @@ Eigen::MatrixXd modal_basis(const BasisInput& input, int size) {
   return basis;
 }
 
-Eigen::MatrixXd trained_basis(const BasisInput& input, const Eigen::MatrixXd& snapshots, bool general, int size) {
+Eigen::MatrixXd trained_basis(const BasisInput& input, const Eigen::MatrixXd& snapshots, bool general, int size,
+                              bool grows) {
   const ElasticSystem& system = input.system;
   const Eigen::VectorXd& values = input.modes.eigenvalues;
   const double decay = values[general ? 0 : std::min<Eigen::Index>(4, values.size() - 1)];
@@ -161,6 +174,11 @@ Eigen::MatrixXd trained_basis(const BasisInput& input, const Eigen::MatrixXd& sn
   const Eigen::MatrixXd fields = unit_fields(system, input.example_fields);
   if (fields.cols() <= most_fields(kBasisSize)) {  // runs of a few loads may show them by themselves
     Eigen::MatrixXd basis = with_first(Eigen::MatrixXd(columns.rows(), 0));
+    if (grows) {
+      add_unshown(system.mass, fields, basis);
+      finish(input, basis);
+      return basis;
+    }
     if (largest_loss(system.mass, basis, fields) <= kUnshownLoss) return basis;
   }
   return with_first(principal_components(system.mass, fields, most_fields(size)));

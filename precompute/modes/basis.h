@@ -12,7 +12,7 @@ struct BasisInput {
   Eigen::MatrixXd example_fields;      ///< f x (K-1) displacements that the basis must hold, or no columns
 };
 
-/// Modes that example fields [f x N] ask for: kBasisSize, or as many principal components as hold each field to 5 %,
+/// Modes that example fields [f x N] ask for: kBasisSize, or as many principal components as hold each field to 2 %,
 /// and half of kBasisSize beside them.
 int basis_size_for(const ElasticSystem& system, const Eigen::MatrixXd& fields);
 
@@ -27,8 +27,10 @@ Eigen::MatrixXd modal_basis(const BasisInput& input, int size);
 /// no run had find the lowest modes. Example fields come first where the basis would lose 15 % of one, since a scene
 /// need not show the poses that a host will ask for, and where they are so many that basis_size_for() takes more for
 /// them.
+/// With `grows` the basis has more than `size` modes instead: those that the fields need beside it to lose 0.5 %.
 /// With `general` both have the same norm, in M + K / omega_1^2: for loads that the snapshots do not know. Throws as
 /// modal_basis() does, of all this.
-Eigen::MatrixXd trained_basis(const BasisInput& input, const Eigen::MatrixXd& snapshots, bool general, int size);
+Eigen::MatrixXd trained_basis(const BasisInput& input, const Eigen::MatrixXd& snapshots, bool general, int size,
+                              bool grows = false);
 
 }  // namespace exmat::precompute

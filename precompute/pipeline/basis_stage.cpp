@@ -77,7 +77,8 @@ BasisChoice BasisChooser::choose(int size) const {
   BasisChoice choice;
   choice.basis = modal_basis(input, size);
   if (motions_ == nullptr) return choice;
-  Eigen::MatrixXd trained = trained_basis(input, balanced_snapshots(stages_, *motions_), motions_->general, size);
+  Eigen::MatrixXd trained = trained_basis(input, balanced_snapshots(stages_, *motions_), motions_->general, size,
+                                          !stages_.asset.basis_size && !stages_.asset.basis_tolerance);
   choice.modal = run(choice.basis);
   choice.exact = run(trained);
   choice.trained = choice.exact.shape <= choice.modal.shape;

@@ -456,7 +456,8 @@ void Pipeline::read() {
                                                           .surface = asset_.object_mesh.string()});
     scene_ = &*own_scene_;
   }
-  if (object_.skeleton && scene_ != nullptr) require_uncompensated(*scene_);
+  if (object_.skeleton && scene_ != nullptr && !(asset_.clamp_follows && object_.skeleton->bones.size() == 1))
+    require_uncompensated(*scene_);
   warn_of_size(object_, asset_.object_mesh.string(), report_.warnings);
   std::ranges::copy(object_.warnings, std::back_inserter(report_.warnings));
   require_regions(asset_, needs_);
@@ -469,7 +470,8 @@ void Pipeline::read() {
 
   if (includes(report_.ledger, "render"))
     render_ = timed("render mesh", [&] { return read_render_mesh(asset_, object_, report_.inputs, report_.warnings); });
-  report_.input_sha256 = hash_inputs(report_.inputs, generator() + "\n" + text_of(needs_) + loads_text());
+  report_.input_sha256 = hash_inputs(report_.inputs, generator() + "\n" + text_of(needs_) + loads_text() +
+                                                         (asset_.clamp_follows ? "its clamp follows\n" : ""));
 }
 
 ReducedModel Pipeline::run() {

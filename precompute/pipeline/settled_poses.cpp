@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
+#include <limits>
 #include <memory>
 #include <numbers>
 
@@ -27,10 +28,18 @@ constexpr int kMostSteps = 50;           // each minimises the potential
 constexpr double kSettledChange = 1e-9;  // of q in a step
 constexpr double kStrongest = 1e6;       // times the stiffness of the highest mode, or the body's own
 constexpr double kNextStrength = 10;     // from one strength that is tried to the next
+constexpr double kWorse = 1.02;          // times the least distance: a strength is too much
+constexpr int kHalvings = 4;             // between the best strength and one that is too much
 constexpr double kGood = 0.05;           // an error that needs no advice
 
 using Coordinates = std::optional<Eigen::VectorXd>;  // q [r]; nothing where the body does not settle
-using Shape = std::optional<Eigen::VectorXd>;        // displacement [3n], as a group sees it; likewise
+using Shape = std::optional<Eigen::VectorXd>;        // displacement [3n]; likewise
+
+// What steps a body: of one on bones, that in all its vertices.
+struct SteppedBody {
+  std::shared_ptr<const runtime::Model> model;
+  std::unique_ptr<const runtime::FullModel> full;
+};
 
 // The whole body's, or those of a region.
 template <typename Model>
@@ -49,18 +58,20 @@ class PoseSettler {
   /// By which the stiffness of the load has the force of another strength where that settles; a column for each
   /// example.
   struct Shifts {
-    Eigen::MatrixXd pull;          // r x K
+    Eigen::MatrixXd pull;          // r x K; 0 of a body on bones
     Eigen::MatrixXd coefficients;  // 3m x K, of a body that may step in full space
   };
-  std::optional<Shifts> shifts(double strength) const;
+  SteppedBody stepped() const;
+  bool add_shift(double strength, Eigen::Index k, Shifts& shifts) const;
+  void shift(const Shifts& by, const TargetTableData& plain, const RowMatrix& plain_full);
   void compensate();
   std::vector<double> strengths(Eigen::Index group) const;
   runtime::StepScene scene(const runtime::Model& model, Eigen::Index group, Eigen::Index k, double stiffness,
                            const Eigen::Vector3d& gravity) const;
   Coordinates settled(const runtime::Model& model, Eigen::Index group, Eigen::Index k, double stiffness,
                       const Eigen::Vector3d& gravity) const;
-  Shape settled_in_all_vertices(Eigen::Index group, const runtime::StepScene& scene) const;
-  Shape settled_shape(const runtime::Model& model, Eigen::Index group, Eigen::Index k, double stiffness,
+  Shape settled_in_all_vertices(const SteppedBody& body, const runtime::StepScene& scene) const;
+  Shape settled_shape(const SteppedBody& body, Eigen::Index group, Eigen::Index k, double stiffness,
                       const Eigen::Vector3d& gravity) const;
   Eigen::VectorXd held(Eigen::Index group, const Eigen::VectorXd& given) const;
   bool is_elastic(Eigen::Index group) const { return load_.examples[static_cast<std::size_t>(group)].elastic; }
@@ -75,9 +86,8 @@ class PoseSettler {
   const BodyStages& stages_;
   ReducedModel model_;
   SettlingLoad load_;
-  std::shared_ptr<const runtime::Model> plain_;     // its targets are those of the examples
-  std::shared_ptr<const runtime::Model> loaded_;    // compensated, if asked for
-  std::unique_ptr<const runtime::FullModel> full_;  // present for a body on bones
+  SteppedBody plain_;                  // its targets are those of the examples
+  std::optional<SteppedBody> loaded_;  // compensated, if asked for
 };
 
 PoseSettler::PoseSettler(const BodyStages& stages, const ReducedModel& model, const std::optional<SettlingLoad>& load)
@@ -85,12 +95,18 @@ PoseSettler::PoseSettler(const BodyStages& stages, const ReducedModel& model, co
   if (!model_.rigid && !stages.system.constrained())
     model_.rigid = rigid_moments(stages.object.mesh, stages.object.materials.density, model.modal->basis);
   load_.examples.resize(static_cast<std::size_t>(stages.fitter->groups()));
-  plain_ = loaded_ = stepped_model(model_, reference_of(stages_), load_.examples);
+  plain_ = stepped();
   if (load_.compensate) compensate();
-  if (!model_.skeleton) return;
-  runtime::FullModelResult full = runtime::build_full_model(model_, *plain_);
+}
+
+// By the targets that the model has now.
+SteppedBody PoseSettler::stepped() const {
+  SteppedBody body{stepped_model(model_, reference_of(stages_), load_.examples), nullptr};
+  if (!model_.skeleton) return body;
+  runtime::FullModelResult full = runtime::build_full_model(model_, *body.model);
   if (!full.model) throw InputError(std::move(full.complaint));
-  full_ = std::move(full.model);
+  body.full = std::move(full.model);
+  return body;
 }
 
 // Stiffnesses that are tried, from that of the lowest mode to one that leaves nothing to elasticity.
@@ -135,45 +151,50 @@ Coordinates PoseSettler::settled(const runtime::Model& model, Eigen::Index group
   return std::nullopt;
 }
 
-Shape PoseSettler::settled_in_all_vertices(Eigen::Index group, const runtime::StepScene& scene) const {
-  runtime::State state = runtime::make_state(*plain_);
-  runtime::prepare_full(*full_, state);
-  runtime::enter_full_space(*full_, *plain_, state);
-  runtime::put_by_shifts(*full_, scene, state);
-  runtime::Workspace workspace(*plain_, scene);
-  runtime::FullWorkspace own(*full_, scene);
+Shape PoseSettler::settled_in_all_vertices(const SteppedBody& body, const runtime::StepScene& scene) const {
+  runtime::State state = runtime::make_state(*body.model);
+  runtime::prepare_full(*body.full, state);
+  runtime::enter_full_space(*body.full, *body.model, state);
+  runtime::put_by_shifts(*body.full, scene, state);
+  runtime::Workspace workspace(*body.model, scene);
+  runtime::FullWorkspace own(*body.full, scene);
   for (int step = 0; step < kMostSteps; ++step) {
     const Eigen::VectorXd before = state.full->q;
-    const auto report = runtime::step_in_full_space(*full_, *plain_, scene, state, workspace, own);
+    const auto report = runtime::step_in_full_space(*body.full, *body.model, scene, state, workspace, own);
     if ((report.status & runtime::kStepNonFinite) != 0) return std::nullopt;
-    runtime::put_on_bones(*full_, state.full->skeleton->bones, state);  // without velocities
+    runtime::put_on_bones(*body.full, state.full->skeleton->bones, state);  // without velocities
     if ((state.full->q - before).norm() > kSettledChange * state.full->q.norm()) continue;
-    const Eigen::Index vertices = full_->space.mesh_vertices();
+    const Eigen::Index vertices = body.full->space.mesh_vertices();
     Eigen::VectorXd shape(3 * vertices);
     for (Eigen::Index v = 0; v < vertices; ++v)
-      shape.segment<3>(3 * v) = runtime::full_displacement(*full_, {}, *state.full, v);
-    return Eigen::VectorXd(stages_.fitter->seen(group, shape));
+      shape.segment<3>(3 * v) = runtime::full_displacement(*body.full, {}, *state.full, v);
+    return shape;
   }
   return std::nullopt;
 }
 
-Shape PoseSettler::settled_shape(const runtime::Model& model, Eigen::Index group, Eigen::Index k, double stiffness,
+// As the group sees it.
+Shape PoseSettler::settled_shape(const SteppedBody& body, Eigen::Index group, Eigen::Index k, double stiffness,
                                  const Eigen::Vector3d& gravity) const {
-  if (full_) return settled_in_all_vertices(group, scene(*plain_, group, k, stiffness, gravity));
-  const Coordinates q = settled(model, group, k, stiffness, gravity);
+  if (body.full) {
+    const Shape shape = settled_in_all_vertices(body, scene(*body.model, group, k, stiffness, gravity));
+    return shape ? Shape(stages_.fitter->seen(group, *shape)) : std::nullopt;
+  }
+  const Coordinates q = settled(*body.model, group, k, stiffness, gravity);
   return q ? Shape(field(group, *q)) : std::nullopt;
 }
 
 // The unknowns of the body's steps hold this part of a pose: modes, or all vertices but those that bones hold
 // elsewhere.
 Eigen::VectorXd PoseSettler::held(Eigen::Index group, const Eigen::VectorXd& given) const {
-  if (!full_) return field(group, model_.modal->basis.transpose() * (stages_.system.full_mass * given));
+  if (!plain_.full) return field(group, model_.modal->basis.transpose() * (stages_.system.full_mass * given));
   if (model_.skeleton->shifts.rows() > 0) return given;
   return stages_.system.extend(stages_.system.restrict(given));
 }
 
 SettledPose PoseSettler::settle(Eigen::Index group, Eigen::Index k) const {
   const PoseFitter& fitter = *stages_.fitter;
+  const SteppedBody& loaded = loaded_ ? *loaded_ : plain_;
   const PoseFitter::PoseFields pose = fitter.pose_fields(group, k);
   const double size = norm(pose.given);
   const Eigen::VectorXd in_basis = held(group, pose.given);
@@ -181,66 +202,82 @@ SettledPose PoseSettler::settle(Eigen::Index group, Eigen::Index k) const {
   found.region = fitter.region(group);
   found.example = examples_of(model_, found.region).examples[static_cast<std::size_t>(k)].name;
   found.basis = norm(pose.given - in_basis) / size;
-  found.clamp = full_ ? found.basis : norm(pose.carried - pose.clamped) / size;
-  found.compensable = !full_ && !load_.compensate && found.region.empty() && model_.targets && !is_elastic(group);
+  found.clamp = plain_.full ? found.basis : norm(pose.carried - pose.clamped) / size;
+  found.compensable = (!model_.skeleton || model_.skeleton->is_clamp()) && !load_.compensate && found.region.empty() &&
+                      model_.targets && !is_elastic(group);
 
   Shape best;
   for (const double strength : strengths(group)) {
-    Shape shape = settled_shape(*plain_, group, k, strength, Eigen::Vector3d::Zero());
+    Shape shape = settled_shape(plain_, group, k, strength, Eigen::Vector3d::Zero());
     if (shape && (!best || error(pose.given, shape) < error(pose.given, best))) best = std::move(shape);
   }
   Shape shape = best;
   found.best = error(pose.given, best);
   const double stiffness = load_.examples[static_cast<std::size_t>(group)].stiffness;
   if (stiffness > 0) {
-    shape = settled_shape(*loaded_, group, k, stiffness, load_.gravity);
+    shape = settled_shape(loaded, group, k, stiffness, load_.gravity);
     found.loaded = error(pose.given, shape);
   }
   found.settles = best && shape;
   if (!found.settles) return found;
   found.eigenfunctions = norm(in_basis - *best) / size;
   found.force = norm(*shape - *best) / size;
-  if (found.force > std::max(found.basis, found.eigenfunctions))
-    found.stronger = error(pose.given, settled_shape(*loaded_, group, k, kNextStrength * stiffness, load_.gravity));
+  const bool by_force = found.force > std::max(found.basis, found.eigenfunctions);
+  found.unheld = by_force && load_.compensate && found.region.empty();
+  if (by_force && !found.unheld)
+    found.stronger = error(pose.given, settled_shape(loaded, group, k, kNextStrength * stiffness, load_.gravity));
   const Eigen::VectorXd off = *shape - pose.given;
   const Eigen::VectorXd distances = off.reshaped<Eigen::RowMajor>(off.size() / 3, 3).rowwise().norm();
   found.distance = distances.maxCoeff(&found.vertex);
   return found;
 }
 
-// Nothing where the body does not settle.
-std::optional<PoseSettler::Shifts> PoseSettler::shifts(double strength) const {
-  const runtime::ExampleModel& force = plain_->examples.front();
-  const Eigen::Index count = std::ssize(model_.examples->examples);
-  runtime::TargetTable::Workspace workspace = force.table->make_workspace();
-  Shifts found{Eigen::MatrixXd(plain_->modes(), count), {}};
-  if (model_.full_space) found.coefficients.resize(model_.full_space->from_target.cols(), count);
-  Eigen::VectorXd pull(plain_->modes());
-  std::optional<runtime::TargetTable> full;
-  if (model_.full_space) {
-    TargetTableData data = *model_.targets;
-    data.control_points = model_.full_space->control_points;
-    full.emplace(data);
-  }
+// Puts the column of an example; false where the body does not settle.
+bool PoseSettler::add_shift(double strength, Eigen::Index k, Shifts& shifts) const {
   const double share = strength / load_.examples.front().stiffness - 1;
-  for (Eigen::Index k = 0; k < count; ++k) {
-    const Coordinates q = settled(*plain_, 0, k, strength, load_.gravity);
-    if (!q) return std::nullopt;
-    force.table->evaluate(Eigen::VectorXd::Unit(count, k), workspace, pull);
-    found.pull.col(k) = share * (pull - force.filter.matrix() * *q);
-    if (!full) continue;
-    runtime::TargetTable::Workspace scratch = full->make_workspace();
-    Eigen::VectorXd target(found.coefficients.rows());
-    full->evaluate(Eigen::VectorXd::Unit(count, k), scratch, target);
-    found.coefficients.col(k) =
-        share *
-        (target - filter_coefficients(model_.full_space->filter, model_.modal->basis * *q).reshaped<Eigen::RowMajor>());
+  const Eigen::VectorXd weights = Eigen::VectorXd::Unit(shifts.pull.cols(), k);
+  Eigen::VectorXd displacement;  // beside what the example shifts
+  if (plain_.full) {
+    const Shape shape = settled_in_all_vertices(plain_, scene(*plain_.model, 0, k, strength, load_.gravity));
+    if (!shape) return false;
+    const Eigen::Index vertices = model_.object->mesh.vertex_count();
+    const RowMatrix shift = model_.skeleton->shifts.middleRows(k * vertices, vertices);
+    displacement = *shape - shift.reshaped<Eigen::RowMajor>();
+  } else {
+    const runtime::ExampleModel& force = plain_.model->examples.front();
+    const Coordinates q = settled(*plain_.model, 0, k, strength, load_.gravity);
+    if (!q) return false;
+    displacement = model_.modal->basis * *q;
+    runtime::TargetTable::Workspace workspace = force.table->make_workspace();
+    Eigen::VectorXd pull(plain_.model->modes());
+    force.table->evaluate(weights, workspace, pull);
+    shifts.pull.col(k) = share * (pull - force.filter.matrix() * *q);
   }
-  return found;
+  if (!model_.full_space) return true;
+  TargetTableData data = *model_.targets;
+  data.control_points = model_.full_space->control_points;
+  const runtime::TargetTable table(data);
+  runtime::TargetTable::Workspace workspace = table.make_workspace();
+  Eigen::VectorXd target(shifts.coefficients.rows());
+  table.evaluate(weights, workspace, target);
+  shifts.coefficients.col(k) =
+      share * (target - filter_coefficients(model_.full_space->filter, displacement).reshaped<Eigen::RowMajor>());
+  return true;
 }
 
-// By the strength after which the body settles nearest to all poses, from rest: where a force is so weak that a pose is
-// no stable equilibrium, less is more. None where all make it worse.
+// Shifts the targets of the model from where they were by themselves, those of full space from `plain_full`.
+void PoseSettler::shift(const Shifts& by, const TargetTableData& plain, const RowMatrix& plain_full) {
+  *model_.targets = plain;
+  shift_targets(by.pull, *model_.targets);
+  if (!model_.full_space) return;
+  TargetTableData full = plain;
+  full.control_points = plain_full;
+  shift_targets(by.coefficients, full);
+  model_.full_space->control_points = full.control_points;
+}
+
+// Of each example by the strength after which the body settles nearest to its pose, from rest: where a force is so weak
+// that a pose is no stable equilibrium, less is more. None where all make it worse.
 void PoseSettler::compensate() {
   const auto refuse = [&](const char* place, const char* expected, const char* found, const char* advice) {
     throw InputError({load_.file, place, expected, found, advice});
@@ -251,42 +288,46 @@ void PoseSettler::compensate() {
   const double stiffness = load_.examples.front().stiffness;
   if (!(stiffness > 0))
     refuse("/examples/stiffness", "> 0, where targets are compensated", "0", "leave compensate out");
-  std::vector<Eigen::VectorXd> given;
-  for (Eigen::Index k = 1; k < std::ssize(model_.examples->examples); ++k)
-    given.push_back(stages_.fitter->pose_fields(0, k).given);
-  const auto worst = [&](const runtime::Model& model) {
-    double largest = 0;
-    for (Eigen::Index k = 1; k <= std::ssize(given); ++k)
-      largest = std::max(
-          largest, error(given[static_cast<std::size_t>(k - 1)], settled_shape(model, 0, k, stiffness, load_.gravity)));
-    return largest;
+  const Eigen::Index count = std::ssize(model_.examples->examples);
+  const auto distance = [&](const SteppedBody& body, Eigen::Index k) {
+    const Shape shape = settled_shape(body, 0, k, stiffness, load_.gravity);
+    if (!shape) return std::numeric_limits<double>::infinity();
+    return norm(k == 0 ? *shape : Eigen::VectorXd(*shape - stages_.fitter->pose_fields(0, k).given));
   };
   const TargetTableData plain = *model_.targets;
-  TargetTableData best = plain;
-  std::optional<Shifts> taken;
-  double least = worst(*plain_);
-  for (const double strength : strengths(0)) {
-    auto by = strength > stiffness ? shifts(strength) : std::nullopt;
-    if (!by) continue;
-    *model_.targets = plain;
-    shift_targets(by->pull, *model_.targets);
-    const auto candidate = stepped_model(model_, reference_of(stages_), load_.examples);
-    const double found = worst(*candidate);
-    if (found >= least) continue;
-    least = found;
-    best = *model_.targets;
-    taken = std::move(by);
-  }
-  if (taken && model_.full_space) {
-    TargetTableData full = plain;
-    full.control_points = model_.full_space->control_points;
-    shift_targets(taken->coefficients, full);
-    model_.full_space->control_points = full.control_points;
-  }
-  model_.targets = best;
+  const RowMatrix plain_full = model_.full_space ? model_.full_space->control_points : RowMatrix();
+  const Shifts none{Eigen::MatrixXd::Zero(plain_.model->modes(), count),
+                    Eigen::MatrixXd::Zero(model_.full_space ? plain_full.cols() : 0, count)};
+  Shifts best = none;
+  Eigen::VectorXd least(count), taken = Eigen::VectorXd::Constant(count, stiffness);
+  for (Eigen::Index k = 0; k < count; ++k) least[k] = distance(plain_, k);
+  Eigen::VectorXd too_much = Eigen::VectorXd::Zero(count);  // 0: no strength is known to be
+  const auto try_all = [&](const Eigen::VectorXd& strengths) {
+    Shifts by = none;
+    shift(none, plain, plain_full);
+    for (Eigen::Index k = 0; k < count; ++k)
+      if (strengths[k] > 0 && !add_shift(strengths[k], k, by)) by.pull.col(k).setZero();
+    shift(by, plain, plain_full);
+    const SteppedBody candidate = stepped();
+    for (Eigen::Index k = 0; k < count; ++k) {
+      if (!(strengths[k] > 0)) continue;
+      const double found = distance(candidate, k);
+      if (found > kWorse * least[k]) too_much[k] = strengths[k];
+      if (found >= least[k]) continue;
+      least[k] = found;
+      taken[k] = strengths[k];
+      best.pull.col(k) = by.pull.col(k);
+      best.coefficients.col(k) = by.coefficients.col(k);
+    }
+  };
+  for (const double strength : strengths(0))
+    if (strength > stiffness) try_all((too_much.array() == 0).select(Eigen::VectorXd::Constant(count, strength), 0));
+  for (int halving = 0; halving < kHalvings && (too_much.array() > 0).any(); ++halving)
+    try_all((taken.array() * too_much.array()).sqrt());
+  shift(best, plain, plain_full);
   model_.targets->compensated_stiffness = stiffness;
   model_.targets->compensated_gravity = load_.gravity;
-  loaded_ = stepped_model(model_, reference_of(stages_), load_.examples);
+  loaded_ = stepped();
 }
 
 std::string advice_on(const SettledPose& pose) {
@@ -294,6 +335,8 @@ std::string advice_on(const SettledPose& pose) {
   if (pose.stronger)
     return fmt::format("; ten times examples.stiffness would leave {:.1f} %{}", 100 * *pose.stronger,
                        pose.compensable ? ", examples.compensate about what is best" : "");
+  if (pose.unheld)
+    return "; so weak a force does not hold the pose: raise examples.stiffness, and make the bundle for that";
   if (pose.eigenfunctions > pose.basis)
     return "; more shape_space.eigenfunctions, or a shape_space.tolerance, would hold more of the pose";
   if (2 * pose.clamp > pose.basis)

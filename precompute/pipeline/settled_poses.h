@@ -35,6 +35,7 @@ struct SettledPose {
   std::optional<double>
       stronger;  ///< error under the load with ten times the stiffness, where that is the largest part
 
+  bool unheld = false;       ///< that is the largest part although targets are compensated
   bool compensable = false;  ///< examples.compensate would bring the error to about the best, and is off
 
   double error() const { return loaded.value_or(best); }
@@ -44,8 +45,8 @@ struct SettledPose {
 /// the rest pose, and puts the errors into the examples. `load`: absent, only the best is looked for. Where the load is
 /// to be compensated, the targets of the whole body's examples are shifted first. A force of another stiffness k
 /// settles at q with the force k (g - P_s q), g the target's pull and P_s the filter; with g' = P_s q + k/kappa (g -
-/// P_s q) the stiffness kappa has the same force there. k is what leaves the least error. Throws InputError where there
-/// is no table to shift.
+/// P_s q) the stiffness kappa has the same force there. k is, of each example, what leaves the least error. Throws
+/// InputError where there is no table to shift.
 std::vector<SettledPose> settle_examples(const BodyStages& stages, const std::optional<SettlingLoad>& load,
                                          ReducedModel& model);
 

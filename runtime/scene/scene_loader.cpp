@@ -272,7 +272,7 @@ void check_weights(const SceneConfig& config, const Model& model) {
 void check_compensation(const SceneConfig& config, const ReducedModel& data) {
   if (!config.examples || !data.targets) return;
   const double stiffness = data.targets->compensated_stiffness;
-  if (data.skeleton) require_uncompensated(config);
+  if (data.skeleton && !data.skeleton->is_clamp()) require_uncompensated(config);
   if (config.examples->compensate && stiffness == 0)
     throw InputError({config.file.string(), "/examples/compensate", "a bundle that was made for this scene",
                       config.bundle.string() + ", whose targets are not compensated",

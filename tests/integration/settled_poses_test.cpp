@@ -121,6 +121,38 @@ TEST_F(SettledPoses, AreTheBestWhereTargetsAreCompensated) {
   EXPECT_LT(compensated, 0.2 * norm(end_of_run(at_rest)));
 }
 
+// Of a strong force this body falls over on its way to be crushed; of a bend it is the nearer the stronger that is.
+TEST_F(SettledPoses, AreCompensatedEachByItself) {
+  Json scene = kScene;
+  scene["examples"]["compensate"] = true;
+  ASSERT_EQ(bundle(scene).status, 0);
+  const double alone = bend().settled_error;
+  TetMesh crushed = mesh_;
+  crushed.vertices.col(0) *= 0.5;
+  write_msh(folder_.path("crush.msh"), crushed);
+  asset_ = write_small_bar(
+      folder_, {{"examples", {{{"name", "crush"}, {"mesh", "crush.msh"}}, {{"name", "bend"}, {"mesh", "own.msh"}}}}});
+  scene["examples"]["weights"] = {1, 0, 0};
+  const Outcome made = bundle(scene);
+  ASSERT_EQ(made.status, 0) << made.errors;
+  const std::vector<ExampleData> both = read_bundle(folder_.path("bundle.h5")).examples->examples;
+  fmt::print("bend {:.4f} alone, {:.4f} beside crush, which settles at {:.4f}, best {:.4f}\n", alone,
+             both[2].settled_error, both[1].settled_error, both[1].best_error);
+  EXPECT_NEAR(both[2].settled_error, alone, 0.01);
+  EXPECT_THAT(made.errors, HasSubstr("so weak a force does not hold the pose: raise examples.stiffness"));
+  EXPECT_EQ(made.errors.find("ten times examples.stiffness"), std::string::npos) << "of targets for another";
+}
+
+// The force of a few eigenfunctions takes the body all of the way, since its basis holds the pose as it was given.
+TEST_F(SettledPoses, AreThePosesAlsoWhereEigenfunctionsLoseSomeOfThem) {
+  asset_ = write_small_bar(folder_, {{"examples", {{{"name", "bend"}, {"mesh", "own.msh"}}}},
+                                     {"shape_space", {{"eigenfunctions", 3}, {"tolerance", 0.1}}}});
+  ASSERT_EQ(bundle(kScene).status, 0);
+  fmt::print("lost {:.4f}, best {:.4f}\n", bend().shape_space_error, bend().best_error);
+  EXPECT_GT(bend().shape_space_error, 0.08);
+  EXPECT_LT(bend().best_error, 0.02);
+}
+
 TEST_F(SettledPoses, OfCompensatedTargetsBelongToTheirScene) {
   Json scene = kScene;
   scene["steps"] = 1;

@@ -130,6 +130,23 @@ class Surfaces(unittest.TestCase):
             self.assertLess(fixed[:, 0].max(), 0.3 + 0.5)  # within a cell of the mark
             self.assertEqual(a["render"].attrs["outside"], 0)
 
+    def test_a_clamp_that_poses_move_follows_where_the_scene_lets_it(self):
+        # Each run ends early, by a region that is not there, when the asset is written.
+        spread = self.points * np.where(self.clamp, 1.5, 1)[:, None]
+        write_glb(self.folder / "feet.glb", self.points, self.triangles, {"spread": spread}, {"_FIXED": self.clamp})
+        for more, reason in (({}, ""), ({"integrator": "newmark"}, "the integrator newmark"),
+                             ({"examples": {"stiffness": 1, "force": "elastic"}}, "an elastic example force"),
+                             ({"body": {"motion": [{"time": 0}]}}, "a motion that carries the body")):
+            scene = {"bundle": "a.h5", "examples": {"stiffness": 1}, "regions": [{"name": "none", "stiffness": 1}], **more}
+            (self.folder / "scene.json").write_text(json.dumps(scene))
+            printed = self.run_program("bundle", "feet.glb", "-o", "a.h5", "--scene", "scene.json", "--write-asset", "asset.json", status=2)
+            asset = json.loads((self.folder / "asset.json").read_text())
+            self.assertEqual(asset["object"]["fixed"].get("follow", False), not reason, printed)
+            if reason:
+                self.assertIn(f"the clamp stands still, also where poses move it: it follows none in a scene with {reason}", printed)
+            else:
+                self.assertIn("clamped at _FIXED, which poses move: it follows them", printed)
+
     def test_what_new_writes_becomes_a_motion_by_the_commands_that_it_prints(self):
         printed = self.run_program("new", "tube.glb")
         self.assertEqual({path.name for path in (self.folder / "tube").iterdir()}, {"asset.json", "scene.json"})
@@ -151,7 +168,8 @@ class Surfaces(unittest.TestCase):
                 example = bundle["examples"][name]
                 self.assertAlmostEqual(example.attrs["settled_error"], example.attrs["best_error"], delta=0.02)
                 held = frames[np.abs(times - (2 * k + 1.5)).argmin()] - rest
-                pose = np.tensordot(basis, example["pose"][:], 1)
+                # Both poses move the clamp, which follows: what they do there shifts the body.
+                pose = np.tensordot(basis, example["pose"][:], 1) + bundle["skeleton/shifts"][k + 1]
                 self.assertLess(np.linalg.norm(held - pose), 0.15 * np.linalg.norm(pose), name)
         refused = self.run_program("new", "tube.glb", status=2)
         self.assertIn("tube/asset.json: expected no such file yet", refused)

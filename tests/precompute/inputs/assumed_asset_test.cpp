@@ -1,5 +1,6 @@
 #include "precompute/inputs/assumed_asset.h"
 
+#include <cmath>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <set>
@@ -70,6 +71,30 @@ TEST(AssumedAsset, TakesTheFirst64Targets) {
     const AssetConfig config = asset_of(asset, folder / "asset.json");
     EXPECT_EQ(config.examples.size(), examples);
   }
+}
+
+// The clamp is a corner's edge: two of four vertices.
+TEST(AssumedAsset, FollowsWhereATargetMovesTheClamp) {
+  const TemporaryFolder folder;
+  const auto follows = [&](const std::vector<double>& moves) {
+    test::GltfWriter writer;
+    const int target = writer.positions(moves);
+    const int positions = writer.positions({0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1});
+    const int fixed = writer.accessor(test::kFloat, "SCALAR", {1, 1, 0, 0});
+    const int triangles = writer.accessor(test::kUnsignedByte, "SCALAR", {0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3});
+    writer.mesh_in_node("box", {{"attributes", {{"POSITION", positions}, {"_FIXED", fixed}}},
+                                {"indices", triangles},
+                                {"targets", {{{"POSITION", target}}}}});
+    const Json asset = assumed_asset(folder.write("box.glb", writer.glb()), folder.path());
+    const AssetConfig config = asset_of(asset, folder / "asset.json");
+    EXPECT_EQ(asset["object"]["fixed"].contains("follow"), config.clamp_follows);
+    return config.clamp_follows;
+  };
+  EXPECT_FALSE(follows({0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0})) << "beside the clamp";
+  EXPECT_FALSE(follows({1, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0})) << "all of the clamp";
+  // One end of the clamp: so far that its two halves about the mean are 2.1 and 1.9 % of the rest.
+  EXPECT_TRUE(follows({0, 0, 0, 0.021 * std::sqrt(2), 0, 0, 0, 0, 0, 0, 0, 1}));
+  EXPECT_FALSE(follows({0, 0, 0, 0.019 * std::sqrt(2), 0, 0, 0, 0, 0, 0, 0, 1}));
 }
 
 TEST(AssumedAsset, CutsItsNameBetweenCharacters) {

@@ -225,9 +225,9 @@ std::string refusal(const SurfaceMesh& surface, const CageSettings& settings) {
 TEST(Cage, RefusesSeveralBodies) {
   SurfaceMesh other = ball_surface(6, 1);
   other.vertices.col(0).array() += 6;
-  EXPECT_THAT(refusal(test::together(ball_surface(6, 1), other), {500, {}}),
-              AllOf(HasSubstr("s.obj: the tets that fill the surface"), HasSubstr("component"),
-                    HasSubstr("join the parts")));
+  EXPECT_THAT(
+      refusal(test::together(ball_surface(6, 1), other), {500, {}}),
+      AllOf(HasSubstr("s.obj: the tets that fill the surface"), HasSubstr("component"), HasSubstr("join the parts")));
 }
 
 TEST(Cage, RefusesSurfacesWithoutAnExtent) {
