@@ -30,11 +30,13 @@ struct Fit {
   double alpha, offset, deviation;
 };
 // A cage follows the surface, half of whose vertices are within, so that it has the surface's volume.
-constexpr std::array<Fit, 3> kFollowing = {{{0.5, 0.05, 0.2}, {0.5, 0.1, 0.2}, {0.5, 0.15, 0.15}}};
+constexpr std::array<Fit, 2> kFollowing = {{{0.5, 0.05, 0.2}, {0.5, 0.15, 0.15}}};
 // What is thinner than a cell is filled by tets that stand off, more at each trial.
 constexpr Fit kStandingOff{1, 0.2, 0.1};
 constexpr double kFartherOff = 1.3;
-constexpr int kShapeTrials = 11;
+constexpr int kShapeTrials = 10;
+// Parts of a surface that do not hang together by vertices are one body where tets of some of these trials bridge them.
+constexpr int kJoiningTrials = 5;
 // Trials to find the cell size of a number of tets.
 constexpr int kSizeTrials = 6;
 // Cages that are made where the first has too many or too few tets.
@@ -156,7 +158,7 @@ class CageMaker {
   TetMesh tets(double size, const Fit& fit, unsigned seed, bool improve) const;
   Eigen::Index first_count(double size) const;
   bool is_covered(const TetMesh& mesh, double size) const;
-  std::string fault_of(TetMesh& mesh, double size) const;
+  std::string fault_of(TetMesh& mesh, double size, int trial) const;
 
   const UnitSurface& surface_;
   const std::string& name_;
@@ -211,12 +213,12 @@ bool CageMaker::is_covered(const TetMesh& mesh, double size) const {
 }
 
 // What keeps the mesh from being a cage, if anything does.
-std::string CageMaker::fault_of(TetMesh& mesh, double size) const {
+std::string CageMaker::fault_of(TetMesh& mesh, double size, int trial) const {
   if (mesh.tet_count() == 0) return "nothing to fill";
   const double angle = tet_volumes(mesh).minCoeff() > 0 ? dihedral_angles(mesh).first : 0;
   if (angle < kLeastDihedralAngle) return fmt::format("a dihedral angle of {:.1f} degrees", angle);
   if (!is_covered(mesh, size)) return "vertices of the surface far outside";
-  if (!connected_) return "";
+  if (!connected_ && trial >= kJoiningTrials) return "";
   TetMesh copy = mesh;
   const bool falls_apart = check_mesh(copy, name_, {.drop_smaller_components = true}).dropped_components > 0;
   return falls_apart ? "several components" : "";
@@ -226,7 +228,7 @@ TetMesh CageMaker::shape(double size, int& trial) const {
   std::string why;
   for (; trial < kShapeTrials; ++trial) {
     TetMesh mesh = tets(size, fit_of(trial), static_cast<unsigned>(trial), true);
-    why = fault_of(mesh, size);
+    why = fault_of(mesh, size, trial);
     if (why.empty()) return mesh;
     log::debug(fmt::format("{}: cage {} has {}; another trial", name_, trial + 1, why));
   }

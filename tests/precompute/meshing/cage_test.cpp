@@ -202,6 +202,14 @@ TEST(Cage, OfWhatHangsTogetherIsOneBody) {
   EXPECT_NEAR(static_cast<double>(cage.mesh.tet_count()), 300, kCountOfThin * 300);
 }
 
+// A flag stands in a cube without a vertex in common: tets that follow it closely fall apart.
+TEST(Cage, OfPartsThatCrossIsOneBody) {
+  SurfaceMesh flag = box_surface({12, 1, 8}, {2, 0.0001, 0.8});
+  flag.vertices.rowwise() += Eigen::RowVector3d(0.9, 0.5, 0.1);
+  const SurfaceMesh parts = test::together(box_surface({8, 8, 8}, {1, 1, 1}), flag);
+  expect_cage(make_cage(parts, {2000, {}}, "flag"), parts);
+}
+
 TEST(Cage, IgnoresTrianglesWithoutAreaAndVerticesWithoutTriangles) {
   SurfaceMesh ball = ball_surface(6, 1);
   const Eigen::Index n = ball.vertices.rows();
