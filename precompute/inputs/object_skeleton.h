@@ -25,7 +25,7 @@ void fill_weights(const TetMesh& mesh, RowMatrix& weights);
 /// the bone holds the next deepest, too. They get that bone's weight alone. Warns of bones that hold none.
 FlagVector pin_to_bones(const VertexArray& vertices, const SurfaceTree& surface, SkeletonData& skeleton,
                         std::vector<std::string>& warnings);
-inline constexpr double kOwnWeight = 0.95, kDepth = 0.35;
+inline constexpr double kOwnWeight = 0.8, kDepth = 0.35;
 
 /// One bone, "clamp", that holds all of the mesh, with its joint in the middle of the fixed vertices.
 SkeletonData clamp_bone(const TetMesh& mesh, const FlagVector& fixed);

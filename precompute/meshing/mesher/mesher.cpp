@@ -179,7 +179,8 @@ double thickness(const Wrap& wrap) {
 
 exmat::TetMesh make_tets(const MesherRequest& request) {
   const Wrap wrap = wrap_of(request);
-  if (thickness(wrap) < 2 * request.deviation) return {};
+  // Tets that may deviate by more than the wrap stands off have nothing to fill in a sheet.
+  if (request.offset < 2 * request.deviation && thickness(wrap) < 2 * request.deviation) return {};
   exmat::TetMesh mesh = fill(wrap, request, 0);
   return covers(mesh, wrap, request.cell_size) ? mesh : fill(wrap, request, request.cell_size);
 }
