@@ -31,7 +31,8 @@ struct Fit {
 };
 // A cage follows the surface, half of whose vertices are within, so that it has the surface's volume.
 constexpr std::array<Fit, 2> kFollowing = {{{0.5, 0.05, 0.2}, {0.5, 0.15, 0.15}}};
-// What is thinner than a cell is filled by tets that stand off, more at each trial.
+constexpr int kClose = std::ssize(kFollowing);
+// Tets in parts that are thinner than a cell stand off, more at each trial.
 constexpr Fit kStandingOff{1, 0.2, 0.1};
 constexpr double kFartherOff = 1.3;
 constexpr int kShapeTrials = 10;
@@ -135,8 +136,6 @@ bool is_closed(const TriangleArray& triangles) {
   return std::ranges::all_of(balance, [](const auto& edge) { return edge.second == 0; });
 }
 
-constexpr int kClose = std::ssize(kFollowing);
-
 Fit fit_of(int trial) {
   if (trial < kClose) return kFollowing[static_cast<std::size_t>(trial)];
   const double farther = std::pow(kFartherOff, trial - kClose);
@@ -157,7 +156,6 @@ class CageMaker {
   double size_for(int cells) const;
   TetMesh tets(double size, const Fit& fit, unsigned seed, bool improve) const;
   Eigen::Index first_count(double size) const;
-  bool is_covered(const TetMesh& mesh, double size) const;
   std::string fault_of(TetMesh& mesh, double size, int trial) const;
 
   const UnitSurface& surface_;
@@ -208,16 +206,13 @@ double CageMaker::size_for(int cells) const {
   return best;
 }
 
-bool CageMaker::is_covered(const TetMesh& mesh, double size) const {
-  return nearest_points(mesh, surface_.mesh.vertices).distances.maxCoeff() <= kOutside * size;
-}
-
-// What keeps the mesh from being a cage, if anything does.
+// The reason why the mesh is no cage; empty where it is one.
 std::string CageMaker::fault_of(TetMesh& mesh, double size, int trial) const {
   if (mesh.tet_count() == 0) return "nothing to fill";
   const double angle = tet_volumes(mesh).minCoeff() > 0 ? dihedral_angles(mesh).first : 0;
   if (angle < kLeastDihedralAngle) return fmt::format("a dihedral angle of {:.1f} degrees", angle);
-  if (!is_covered(mesh, size)) return "vertices of the surface far outside";
+  if (nearest_points(mesh, surface_.mesh.vertices).distances.maxCoeff() > kOutside * size)
+    return "vertices of the surface far outside";
   if (!connected_ && trial >= kJoiningTrials) return "";
   TetMesh copy = mesh;
   const bool falls_apart = check_mesh(copy, name_, {.drop_smaller_components = true}).dropped_components > 0;

@@ -35,7 +35,7 @@ constexpr double kGood = 0.05;           // an error that needs no advice
 using Coordinates = std::optional<Eigen::VectorXd>;  // q [r]; nothing where the body does not settle
 using Shape = std::optional<Eigen::VectorXd>;        // displacement [3n]; likewise
 
-// What steps a body: of one on bones, that in all its vertices.
+// A model that is stepped, and its full space where the body steps in all its vertices: one on bones.
 struct SteppedBody {
   std::shared_ptr<const runtime::Model> model;
   std::unique_ptr<const runtime::FullModel> full;
@@ -62,7 +62,7 @@ class PoseSettler {
     Eigen::MatrixXd coefficients;  // 3m x K, of a body that may step in full space
   };
   SteppedBody stepped() const;
-  bool add_shift(double strength, Eigen::Index k, Shifts& shifts) const;
+  void add_shift(double strength, Eigen::Index k, Shifts& shifts) const;
   void shift(const Shifts& by, const TargetTableData& plain, const RowMatrix& plain_full);
   void compensate();
   std::vector<double> strengths(Eigen::Index group) const;
@@ -232,28 +232,28 @@ SettledPose PoseSettler::settle(Eigen::Index group, Eigen::Index k) const {
   return found;
 }
 
-// Puts the column of an example; false where the body does not settle.
-bool PoseSettler::add_shift(double strength, Eigen::Index k, Shifts& shifts) const {
+// Puts the column of an example; leaves it where the body does not settle.
+void PoseSettler::add_shift(double strength, Eigen::Index k, Shifts& shifts) const {
   const double share = strength / load_.examples.front().stiffness - 1;
   const Eigen::VectorXd weights = Eigen::VectorXd::Unit(shifts.pull.cols(), k);
   Eigen::VectorXd displacement;  // beside what the example shifts
   if (plain_.full) {
     const Shape shape = settled_in_all_vertices(plain_, scene(*plain_.model, 0, k, strength, load_.gravity));
-    if (!shape) return false;
+    if (!shape) return;
     const Eigen::Index vertices = model_.object->mesh.vertex_count();
     const RowMatrix shift = model_.skeleton->shifts.middleRows(k * vertices, vertices);
     displacement = *shape - shift.reshaped<Eigen::RowMajor>();
   } else {
     const runtime::ExampleModel& force = plain_.model->examples.front();
     const Coordinates q = settled(*plain_.model, 0, k, strength, load_.gravity);
-    if (!q) return false;
+    if (!q) return;
     displacement = model_.modal->basis * *q;
     runtime::TargetTable::Workspace workspace = force.table->make_workspace();
     Eigen::VectorXd pull(plain_.model->modes());
     force.table->evaluate(weights, workspace, pull);
     shifts.pull.col(k) = share * (pull - force.filter.matrix() * *q);
   }
-  if (!model_.full_space) return true;
+  if (!model_.full_space) return;
   TargetTableData data = *model_.targets;
   data.control_points = model_.full_space->control_points;
   const runtime::TargetTable table(data);
@@ -262,7 +262,6 @@ bool PoseSettler::add_shift(double strength, Eigen::Index k, Shifts& shifts) con
   table.evaluate(weights, workspace, target);
   shifts.coefficients.col(k) =
       share * (target - filter_coefficients(model_.full_space->filter, displacement).reshaped<Eigen::RowMajor>());
-  return true;
 }
 
 // Shifts the targets of the model from where they were by themselves, those of full space from `plain_full`.
@@ -276,8 +275,8 @@ void PoseSettler::shift(const Shifts& by, const TargetTableData& plain, const Ro
   model_.full_space->control_points = full.control_points;
 }
 
-// Of each example by the strength after which the body settles nearest to its pose, from rest: where a force is so weak
-// that a pose is no stable equilibrium, less is more. None where all make it worse.
+// Each example is shifted by the strength after which the body settles nearest to its pose, from rest: where a force is
+// so weak that a pose is no stable equilibrium, less is more. It stays as it is where all make it worse.
 void PoseSettler::compensate() {
   const auto refuse = [&](const char* place, const char* expected, const char* found, const char* advice) {
     throw InputError({load_.file, place, expected, found, advice});
@@ -306,7 +305,7 @@ void PoseSettler::compensate() {
     Shifts by = none;
     shift(none, plain, plain_full);
     for (Eigen::Index k = 0; k < count; ++k)
-      if (strengths[k] > 0 && !add_shift(strengths[k], k, by)) by.pull.col(k).setZero();
+      if (strengths[k] > 0) add_shift(strengths[k], k, by);
     shift(by, plain, plain_full);
     const SteppedBody candidate = stepped();
     for (Eigen::Index k = 0; k < count; ++k) {

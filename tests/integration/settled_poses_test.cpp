@@ -121,7 +121,7 @@ TEST_F(SettledPoses, AreTheBestWhereTargetsAreCompensated) {
   EXPECT_LT(compensated, 0.2 * norm(end_of_run(at_rest)));
 }
 
-// Of a strong force this body falls over on its way to be crushed; of a bend it is the nearer the stronger that is.
+// A strong force makes this body fall over on its way to be crushed; a bend is the nearer the stronger its force is.
 TEST_F(SettledPoses, AreCompensatedEachByItself) {
   Json scene = kScene;
   scene["examples"]["compensate"] = true;

@@ -171,7 +171,7 @@ exmat::TetMesh fill(const Wrap& wrap, const MesherRequest& request, double grid)
   return tets_of(complex);
 }
 
-// That of a plate of the same volume and area; half that of a rod.
+// The thickness of a plate that has the volume and the area of the wrap; a rod is twice as thick.
 double thickness(const Wrap& wrap) {
   return 2 * CGAL::to_double(CGAL::Polygon_mesh_processing::volume(wrap)) /
          CGAL::to_double(CGAL::Polygon_mesh_processing::area(wrap));

@@ -102,7 +102,7 @@ TEST(Cage, FollowsABall) {
   EXPECT_LT(cage.farthest, cage.cell_size / 4);
 }
 
-// How far the outside of a cage is from the surface goes with the cell size, whose deviation from the wrap does.
+// The distance of a cage's outside from the surface goes with the cell size, as its deviation from the wrap does.
 TEST(Cage, FitsCloserTheFinerItIs) {
   const SurfaceMesh ball = ball_surface(12, 1);
   const Cage coarse = make_cage(ball, {{}, 0.2}, "ball"), fine = make_cage(ball, {{}, 0.05}, "ball");
