@@ -305,7 +305,7 @@ void bind_settings(BodyClass& type) {
           "which is this body's.")
       .def("compliance", &compliance, py::arg("points"),
            "Velocities of k points at the end of the last step, of shape (k, 3) [m/s], and what impulses on their "
-           "coordinates make of them in a step, of shape (3k, 3k) [1/kg]; of a body that steps in its modes.")
+           "coordinates make of them in a step, of shape (3k, 3k) [1/kg].")
       .def("apply_impulses", &apply_impulses, py::arg("points"), py::arg("impulses"),
            "Gives k points impulses [N s] of shape (k, 3): velocities change by the compliance times these, and the "
            "body moves on by that times the time step.")

@@ -424,8 +424,8 @@ EXMAT_API exmat_status exmat_body_read_attachment_load(const exmat_body* body, i
                                                        double* torque, int32_t* broken) EXMAT_NOEXCEPT;
 
 /* Impulses: a host that solves its own joints and contacts takes the body as a thing of these velocities and this
-   inverse mass between two steps, and gives it the impulses that it found, as often as it likes. Of a body that steps
-   in its modes. */
+   inverse mass between two steps, and gives it the impulses that it found, as often as it likes. One of space `auto`
+   then steps in all its vertices, until it was left alone. */
 
 /* World `velocity` [coordinates = 3k] [m/s] of the points at the end of the last step, and `compliance` [3k x 3k, by
    rows] [1/kg]: the change of these velocities by an impulse of 1 N s on each coordinate, W = J A^-1 J^T with the mass,

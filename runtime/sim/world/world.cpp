@@ -206,6 +206,11 @@ void World::enter_full(Member& member) {
   member.is_bounded = false;
 }
 
+void World::was_pushed(int body) {
+  Member& own = at(body);
+  if (own.kind.full != nullptr && own.kind.scene->space.space == Space::kAuto) enter_full(own);
+}
+
 void World::take_full_scratch(Member& member) {
   const auto idle = std::ranges::find(idle_full_, member.kind.full, [](const auto& own) { return own.first; });
   if (idle == idle_full_.end()) {

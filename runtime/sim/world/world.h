@@ -75,6 +75,9 @@ class World {
   /// That of its steps in full space; null where it is not there.
   FullWorkspace* full_scratch(int body) noexcept { return at(body).full.get(); }
 
+  /// After a host gave a body impulses between two steps: one of space `auto` is in full space from now on.
+  void was_pushed(int body);
+
   /// Sizes scratch for steps by so many threads, which they else do themselves.
   void prepare(int threads);
 

@@ -5,8 +5,9 @@
 #include <gtest/gtest.h>
 
 #include "common/core/decompositions.h"
-#include "runtime/sim/space/full/full_body.h"
+#include "runtime/sim/space/full/full_response.h"
 #include "runtime/sim/step/contact_step.h"
+#include "runtime/sim/step/impulse_response.h"
 #include "runtime/sim/world/world.h"
 #include "tests/precompute/full_space/full_space_bar.h"
 #include "tests/support/allocation_counter.h"
@@ -103,6 +104,36 @@ struct AttachedBar {
   std::optional<runtime::Workspace> workspace;
   std::optional<runtime::FullWorkspace> own;
 };
+
+// Conjugate gradients in single precision, among what is projected away, beside a dense factor under conditions.
+TEST(Attachment, HoldsAgainstImpulsesAsInAllModes) {
+  for (const auto kind : {AttachmentKind::kFixed, AttachmentKind::kBall, AttachmentKind::kSpring}) {
+    AttachedBar body(true), modes(true, true);
+    for (AttachedBar* const one : {&body, &modes}) {
+      runtime::Attachment& attachment = one->attach(kind);
+      attachment.stiffness = 2000;
+      attachment.damping = 3;
+      one->step();
+    }
+    const Eigen::Index tip = body.rest().rows() - 1;
+    const RowMatrix rows = modes.bar.basis().middleRows<3>(3 * tip);
+    const VertexArray rest = modes.rest().row(tip);
+    runtime::ImpulseResponse reference(*modes.model, modes.scene, modes.state);
+    reference.update(modes.scene.time_step, runtime::Tangent::kExact);
+    const Eigen::MatrixXd J = reference.jacobian({rest, rows});
+    const Eigen::Matrix3d expected = J * reference.solve(J.transpose());
+    runtime::FullImpulseResponse response(*body.full, *body.model, body.scene, body.state, *body.workspace, *body.own);
+    const IndexMatrix corners = IndexMatrix::Constant(1, 1, static_cast<std::int32_t>(tip));
+    const RowMatrix shares = RowMatrix::Ones(1, 1);
+    EXPECT_LE((response.compliance({corners, shares}) - expected).norm(), 1e-4 * expected.norm());
+    const runtime::Attachment& held = body.state.attachments.front();
+    const Eigen::Vector3d before = body.mean(held);
+    response.apply({corners, shares}, Eigen::Vector3d(0, 1, 2));
+    if (kind != AttachmentKind::kSpring) {
+      EXPECT_LE((body.mean(held) - before).norm(), 1e-12);
+    }
+  }
+}
 
 // Held vertices are eliminated in the one and projected away in the other.
 TEST(Attachment, OfAFixedPatchIsAClamp) {

@@ -6,7 +6,6 @@
 #include <optional>
 #include <utility>
 
-#include "precompute/shape_space/filter_functions.h"
 #include "runtime/sim/world/world.h"
 #include "tests/precompute/full_space/full_space_bar.h"
 #include "tests/support/random.h"
@@ -18,53 +17,12 @@ namespace full_body_test {
 
 constexpr double kTight = 1e-9;  // of Newton's methods
 
-/// /full_space of a bar whose basis holds all of its motion, so that Y is the basis; of its examples or of a region's.
-FullSpaceData full_space_data_of(const ReducedModel& model, const RegionData* region = nullptr) {
-  const ObjectData& object = *model.object;
-  const LaplaceBasis basis = laplace_basis_of(model);
-  const FilterFunctions functions(basis, object.mesh, object.materials.density);
-  FullSpaceData data;
-  data.filter = functions.root_over_analysis() * functions.analysis;
-  for (Eigen::Index v = 0; v < object.fixed.size(); ++v)
-    if (object.fixed[v] != 0) data.filter.row(v).setZero();
-  data.slopes = weight_slopes(basis, model.shape_space->weighting, region ? region->examples : *model.examples) /
-                functions.root_over_analysis();
-  data.from_target.resize(model.modal->basis.cols(), 3 * data.filter.cols());
-  std::optional<RegionView> view;
-  if (region != nullptr) {
-    FlagVector inside = FlagVector::Zero(object.mesh.vertex_count());
-    inside(region->vertices).setOnes();
-    view.emplace(object.mesh, inside, object.fixed);
-  }
-  for (Eigen::Index i = 0; i < data.from_target.rows(); ++i) {
-    Eigen::VectorXd mode = model.modal->basis.col(i);
-    if (view) mode = view->see(mode);
-    const Eigen::MatrixXd coefficients =
-        data.filter.transpose() * mode.reshaped<Eigen::RowMajor>(object.mesh.vertex_count(), 3);
-    data.from_target.row(i) = coefficients.reshaped<Eigen::RowMajor>().transpose();
-  }
-  if (view) data.filter = (view->window().asDiagonal() * data.filter).eval();
-  return data;
-}
-
 /// Regions of the parts, with their /full_space.
 void add_regions(ReducedModel& model) {
   for (const bool outer : {true, false}) {
     add_region(model, outer ? "outer" : "inner", part_of_bar(model, outer));
     model.regions.back().full_space = full_space_data_of(model, &model.regions.back());
   }
-}
-
-/// Examples may pull elastically, by all elements.
-void make_elastic(ReducedModel& model) {
-  const CubatureData& all = *model.cubature;
-  model.target_elasticity = {.weights = all.weights,
-                             .volumes = all.volumes,
-                             .gradient = all.gradient,
-                             .target_gradient = all.gradient,
-                             .youngs_modulus = all.youngs_modulus,
-                             .poisson_ratio = all.poisson_ratio};
-  model.full_space->shapes = model.modal->basis;
 }
 
 struct TwinOptions {

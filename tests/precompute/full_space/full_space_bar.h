@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "precompute/full_space/full_space_stepper.h"
+#include "precompute/shape_space/filter_functions.h"
 #include "precompute/shape_space/projection.h"
 #include "tests/support/synthetic_model.h"
 
@@ -66,6 +67,47 @@ inline test::Bar complete_bar(test::BarOptions options) {
   const ElasticSystem system = build_elastic_system(model.object->mesh, model.object->materials, model.object->fixed);
   reduce_examples(model, system, whole_body_example_poses(model, system), *model.projection, *model.examples);
   return bar;
+}
+
+/// /full_space of a bar whose basis holds all of its motion, so that Y is the basis; of its examples or of a region's.
+inline FullSpaceData full_space_data_of(const ReducedModel& model, const RegionData* region = nullptr) {
+  const ObjectData& object = *model.object;
+  const LaplaceBasis basis = laplace_basis_of(model);
+  const FilterFunctions functions(basis, object.mesh, object.materials.density);
+  FullSpaceData data;
+  data.filter = functions.root_over_analysis() * functions.analysis;
+  for (Eigen::Index v = 0; v < object.fixed.size(); ++v)
+    if (object.fixed[v] != 0) data.filter.row(v).setZero();
+  data.slopes = weight_slopes(basis, model.shape_space->weighting, region ? region->examples : *model.examples) /
+                functions.root_over_analysis();
+  data.from_target.resize(model.modal->basis.cols(), 3 * data.filter.cols());
+  std::optional<RegionView> view;
+  if (region != nullptr) {
+    FlagVector inside = FlagVector::Zero(object.mesh.vertex_count());
+    inside(region->vertices).setOnes();
+    view.emplace(object.mesh, inside, object.fixed);
+  }
+  for (Eigen::Index i = 0; i < data.from_target.rows(); ++i) {
+    Eigen::VectorXd mode = model.modal->basis.col(i);
+    if (view) mode = view->see(mode);
+    const Eigen::MatrixXd coefficients =
+        data.filter.transpose() * mode.reshaped<Eigen::RowMajor>(object.mesh.vertex_count(), 3);
+    data.from_target.row(i) = coefficients.reshaped<Eigen::RowMajor>().transpose();
+  }
+  if (view) data.filter = (view->window().asDiagonal() * data.filter).eval();
+  return data;
+}
+
+/// Examples may pull elastically, by all elements.
+inline void make_elastic(ReducedModel& model) {
+  const CubatureData& all = *model.cubature;
+  model.target_elasticity = {.weights = all.weights,
+                             .volumes = all.volumes,
+                             .gradient = all.gradient,
+                             .target_gradient = all.gradient,
+                             .youngs_modulus = all.youngs_modulus,
+                             .poisson_ratio = all.poisson_ratio};
+  model.full_space->shapes = model.modal->basis;
 }
 
 inline FullSpaceOptions targets_of(const test::BarOptions& options) { return {.whole_body = options.examples > 0}; }

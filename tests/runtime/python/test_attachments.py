@@ -102,6 +102,23 @@ def test_impulses_change_momenta(free_bundle):
     assert np.abs(np.array(body.motion.linear_velocity) * MASS - impulses.sum(0)).max() < 1e-9
 
 
+def test_impulses_put_a_body_of_two_spaces_into_all_vertices(hung):
+    vertices, _ = end_of(hung)
+    body = exmat.Body(hung)
+    points = exmat.Points(hung, vertices[:1])
+    impulse = np.array([[0, 0, 2.0]])
+    body.step(3)
+    body.apply_impulses(points, impulse)
+    assert body.space == "full"
+    before, compliance = body.compliance(points)
+    body.apply_impulses(points, impulse)
+    after, _ = body.compliance(points)
+    # The second reads the stiffness after the first has moved the body.
+    assert np.abs(after - before - compliance @ impulse.ravel()).max() < 1e-2 * np.abs(after - before).max()
+    body.step(400)
+    assert body.space == "reduced"
+
+
 def test_what_is_held_goes_with_its_frame_and_is_let_go(hung):
     vertices, xyz = end_of(hung)
     body = exmat.Body(hung)

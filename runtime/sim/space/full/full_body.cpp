@@ -202,12 +202,30 @@ FullBodyStep::FullBodyStep(const FullModel& full, const Model& model, const Step
       own_(own),
       step_(full, scene, *state.full, own, full_memory(full, scene, state, workspace)) {}
 
-bool FullBodyStep::begin(bool touches_others, double pushed) noexcept {
+void FullBodyStep::take_time() noexcept {
   FullMotion& motion = *state_.full;
   motion.step = state_.step;
   motion.time = state_.time;
   motion.begins_anew = state_.begins_anew;
-  motion.applied_force = state_.vertex_force;
+}
+
+bool FullBodyStep::stand() noexcept {
+  take_time();
+  step_.stand();
+  find_targets(full_, model_, scene_, state_, workspace_, step_, own_, report_);
+  return (report_.status & kStepNonFinite) == 0;
+}
+
+void FullBodyStep::push(Eigen::VectorXd& impulses) noexcept {
+  step_.push(impulses);
+  set_reduced();
+  wake(state_);
+  state_.full->alone = 0;
+}
+
+bool FullBodyStep::begin(bool touches_others, double pushed) noexcept {
+  take_time();
+  state_.full->applied_force = state_.vertex_force;
   if (is_shifted(state_)) choose_shifts();
   if (workspace_.near) {
     workspace_.near->contact.candidate_count = 0;

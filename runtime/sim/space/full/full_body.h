@@ -54,6 +54,13 @@ class FullBodyStep {
   const StepReport& finish(const FrameMomenta& others = {}) noexcept;
   const StepReport& report() const noexcept { return report_; }
 
+  // In place of a step, of a body that a host gives impulses between two of them.
+
+  /// FullStep::stand(), weights and target. False where numbers are not finite.
+  bool stand() noexcept;
+  /// FullStep::push(). The body wakes.
+  void push(Eigen::VectorXd& impulses) noexcept;
+
   // After finish(), of a step that was solved with those of others.
 
   void add_motion(double share, const FrameVelocity& added) noexcept;
@@ -61,6 +68,7 @@ class FullBodyStep {
   void put(const Eigen::VectorXd& q, double elastic_energy, const Eigen::Vector3d& way) noexcept;
 
  private:
+  void take_time() noexcept;
   void choose_shifts() noexcept;
   void set_reduced() noexcept;
 

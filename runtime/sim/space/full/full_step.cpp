@@ -14,7 +14,8 @@ constexpr int kFarFromFrozen = 12;      // iterations after which the frame of a
 constexpr int kContactIterations = 60;  // of conjugate gradients near obstacles, at most
 constexpr double kLongStep = 0.008;     // [s]
 constexpr double kDelicate = 0.1;       // of the accuracy, in long steps and without damping of stiffness
-constexpr double kForcing = 0.3;        // of what is left to the tolerance, that a direction is solved to
+constexpr FullAccuracy kResponse{1e-5, 300, 0};
+constexpr double kForcing = 0.3;  // of what is left to the tolerance, that a direction is solved to
 
 FullWorkspace::Key key_of(const StepScene& scene) {
   FullWorkspace::Key key{scene.time_step, scene.mass_damping, scene.stiffness_damping, scene.integrator, {}};
@@ -264,12 +265,17 @@ void FullStep::end_bones() noexcept {
   for (Eigen::Index place = space_.vertices(), at = 0; place < space_.places(); ++place, at += 3)
     bones.q.segment<3>(at) = model_.skin->displacement(work.skin, place);
   bones.v = form.velocity_factor * (bones.q - form.velocity_centre);
-  space_.to_field(state_.q, workspace_.trial);
-  model_.skin->to_own(work.skin, workspace_.trial.data(), workspace_.field.data());
   bones.own_previous = bones.own;
-  space_.from_field(workspace_.field, bones.own);
+  set_own();
   bones.bones = bones.next;
   bones.anew = false;
+}
+
+// What the body is displaced by beside its bones, where the workspace's skin is.
+void FullStep::set_own() noexcept {
+  space_.to_field(state_.q, workspace_.trial);
+  model_.skin->to_own(workspace_.potential.skin, workspace_.trial.data(), workspace_.field.data());
+  space_.from_field(workspace_.field, memory_.bones->own);
 }
 
 /// Beside that of the frame of a carried body, in the frame; a field.
@@ -471,7 +477,7 @@ void FullStep::set_scales() noexcept { workspace_.contact.set_scales(linear_->pr
 
 // Preconditioned conjugate gradients from 0, of the gradient over its norm: forces of a body that comes to rest would
 // be too small for single precision.
-FullStep::Outcome FullStep::find_direction(double tolerance) noexcept {
+FullStep::Outcome FullStep::find_direction(double tolerance, int most_iterations) noexcept {
   FullWorkspace& work = workspace_;
   auto residual = work.residual.vector(), solved = work.solved.vector(), search = work.search.vector(),
        image = work.image.vector(), sum = work.sum.vector();
@@ -495,7 +501,7 @@ FullStep::Outcome FullStep::find_direction(double tolerance) noexcept {
     ++report_.cg_iterations;
     const float length = square / curvature;
     sum += length * search;
-    if (iteration >= (near_ ? std::max(work.accuracy.iterations, kContactIterations) : work.accuracy.iterations)) break;
+    if (iteration >= most_iterations) break;
     residual -= length * image;
     precondition();
     const float next = residual.dot(solved);
@@ -561,6 +567,7 @@ NewtonStatus FullStep::minimise() noexcept {
   unchecked_from_ = std::numeric_limits<double>::infinity();
   // A coarse tolerance would leave the body beside its equilibrium for good.
   const NewtonSettings at_least_one{scene_.space.newton.max_iterations, 0};
+  const int most = near_ ? std::max(work.accuracy.iterations, kContactIterations) : work.accuracy.iterations;
   for (;;) {
     newton.residual = report_.residual;
     newton.iterations = report_.newton_iterations;
@@ -568,7 +575,7 @@ NewtonStatus FullStep::minimise() noexcept {
     const NewtonSettings& settings = may_stay ? scene_.space.newton : at_least_one;
     if (const auto reason = reason_to_end(newton, settings, here_, unchecked_from_)) return *reason;
     const double left = settings.tolerance * here_.force_scale / report_.residual;
-    if (find_direction(std::max(direction_tolerance(), kForcing * left)) == Outcome::kIndefinite) {
+    if (find_direction(std::max(direction_tolerance(), kForcing * left), most) == Outcome::kIndefinite) {
       project();
       report_.residual = work.gradient.norm();
       continue;
@@ -661,12 +668,19 @@ void FullStep::correct_momenta(const FrameMomenta& others) noexcept {
     lacking.linear += dt * memory_.found->force;
     lacking.angular += dt * (memory_.found->torque - rigid.centre.cross(memory_.found->force));
   }
-  const FrameMomenta own = model_.rigid->momenta(work.field.data(), rigid);
-  lacking.linear -= own.linear;
-  lacking.angular -= own.angular;
-  RigidPart::add_motion(model_.rigid->motion(lacking, rigid), rigid, work.field.data());
-  space_.from_field(work.field, state_.v);
-  move_centre((own.linear + lacking.linear) / model_.rigid->mass());
+  give_momenta(lacking);
+  move_centre(lacking.linear / model_.rigid->mass());
+}
+
+// A rigid motion beside v, a field in the workspace's `field`, where the workspace places the body.
+void FullStep::give_momenta(const FrameMomenta& momenta) noexcept {
+  const RigidWorkspace& rigid = workspace_.potential.rigid;
+  Eigen::VectorXd& field = workspace_.field;
+  FrameMomenta lacking = model_.rigid->momenta(field.data(), rigid);
+  lacking.linear = momenta.linear - lacking.linear;
+  lacking.angular = momenta.angular - lacking.angular;
+  RigidPart::add_motion(model_.rigid->motion(lacking, rigid), rigid, field.data());
+  space_.from_field(field, state_.v);
 }
 
 // The centre of mass goes as its velocity says: what it is beside that would turn into angular momentum.
@@ -754,6 +768,78 @@ const FullReport& FullStep::finish(const FrameMomenta& others) noexcept {
   state_.time = static_cast<double>(state_.step) * scene_.time_step;
   state_.begins_anew = near_ || among_others_;
   return report_;
+}
+
+void FullStep::stand() noexcept {
+  FullWorkspace& work = workspace_;
+  const StepHistory history{state_.q, state_.v, state_.q_previous, state_.v, state_.v_previous};
+  backward_euler_form(history, scene_.time_step, work.form);
+  linear_ = &work.first;
+  work.external.setZero();
+  potential_.begin(state_.q, work.external);
+  potential_.set_attachments(memory_.attachments);
+  if (model_.carried) {
+    from_ = to_ = frame_at(scene_, state_.time);
+    potential_.drive(from_, to_);
+  }
+  if (model_.skin) {
+    const SkeletonMotion& bones = *memory_.bones;
+    SkinnedPart::place_fixed(bones.q, work.potential.start);
+    model_.skin->place(bones.bones, bones.weights, work.potential.skin);
+  }
+  work.d.setZero();
+  potential_.evaluate_elements(work.d, FullPotential::Tangents::kExact, true);
+}
+
+// Of a free body the rigid motion is that of the impulses, by the rest of which the body deforms alone: damping and
+// single precision see none of it.
+void FullStep::respond(Eigen::VectorXd& impulses) noexcept {
+  FullWorkspace& work = workspace_;
+  const RigidWorkspace& rigid = work.potential.rigid;
+  FrameVelocity whole;
+  if (is_free()) {
+    whole = model_.rigid->motion(model_.rigid->sums(impulses.data(), rigid), rigid);
+    model_.rigid->remove_rigid_force(work.potential.x.data(), rigid, impulses.data());
+  }
+  project_held(space_, memory_.attachments, impulses.data());
+  work.gradient = -impulses;
+  impulses.setZero();
+  if (!work.gradient.isZero(0)) {
+    if (find_direction(kResponse.tolerance, kResponse.iterations) == Outcome::kIndefinite) {
+      projected_ = true;
+      potential_.evaluate_elements(work.d, FullPotential::Tangents::kProjected, true);
+      find_direction(kResponse.tolerance, kResponse.iterations);
+    }
+    impulses = work.direction / (scene_.time_step * scene_.time_step);
+  }
+  if (!is_free()) return;
+  model_.rigid->remove_motion(rigid, impulses.data());
+  RigidPart::add_motion(whole, rigid, impulses.data());
+}
+
+void FullStep::push(Eigen::VectorXd& impulses) noexcept {
+  FullWorkspace& work = workspace_;
+  FrameMomenta momenta;
+  if (is_free()) {
+    const RigidWorkspace& rigid = work.potential.rigid;
+    space_.to_field(state_.v, work.field);
+    const FrameMomenta own = model_.rigid->momenta(work.field.data(), rigid);
+    const FrameMomenta given = model_.rigid->sums(impulses.data(), rigid);
+    momenta = {own.linear + given.linear, own.angular + given.angular};
+  }
+  respond(impulses);
+  space_.from_field(impulses, work.rate);
+  state_.q += scene_.time_step * work.rate;
+  state_.v += work.rate;
+  energies(model_, scene_, state_, work, memory_.bones);
+  if (model_.skin) set_own();
+  space_.to_field(state_.v, work.field);
+  if (model_.rigid) {
+    space_.to_field(state_.q, work.trial);
+    model_.rigid->place(work.trial.data(), work.potential.rigid);
+  }
+  if (is_free()) give_momenta(momenta);
+  state_.begins_anew = true;
 }
 
 FullReport step(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace,

@@ -163,6 +163,17 @@ class FullStep {
   /// rigid motion beside it.
   void add_motion(double share, const FrameVelocity& added) noexcept;
 
+  // In place of a step, of a body that a host gives impulses between two of them.
+
+  /// The body as it stands, without obstacles.
+  void stand() noexcept;
+  /// Change of velocity by impulses, world [N s], as a step of backward Euler would give it (ImpulseResponse). A field,
+  /// in place.
+  void respond(Eigen::VectorXd& impulses) noexcept;
+  /// Adds what respond() makes of them, and the way of a step by it; momenta of a free body change by these impulses.
+  /// The workspace is then as after finish().
+  void push(Eigen::VectorXd& impulses) noexcept;
+
   bool is_near() const noexcept { return near_; }
   /// After begin(): the momenta that external forces alone make of those of a free body.
   FrameMomenta expected_momenta() const noexcept;
@@ -184,11 +195,12 @@ class FullStep {
   void hang(bool second_order) noexcept;
   void take_along() noexcept;
   void end_bones() noexcept;
+  void set_own() noexcept;
   void gather_external_force() noexcept;
   void choose_first_iterate() noexcept;
   NewtonStatus minimise() noexcept;
   NewtonStatus minimise_with_friction() noexcept;
-  Outcome find_direction(double tolerance) noexcept;
+  Outcome find_direction(double tolerance, int most_iterations) noexcept;
   void project() noexcept;
   /// Near obstacles or bodies, where a host holds it or the caller asks for it, and where waves go so far in a step
   /// that the predictor leads away from the solution: what an unchecked direction leaves then would grow.
@@ -202,6 +214,8 @@ class FullStep {
   bool move() noexcept;
   void add_external_impulse() noexcept;
   void correct_momenta(const FrameMomenta& others) noexcept;
+  void give_momenta(const FrameMomenta& momenta) noexcept;
+  bool is_free() const noexcept { return model_.rigid && !is_attached(); }
   void move_centre(const Eigen::Vector3d& velocity) noexcept;
   void limit_energy(double allowed) noexcept;
 
