@@ -141,6 +141,7 @@ void visit_projection(const FieldPlace& place, Projection& projection, Visitor& 
   enter(place, "/projection", visit);
   visit.dataset("shape_from_reduced", projection.shape_from_reduced);
   visit.dataset("reduced_from_shape", projection.reduced_from_shape);
+  visit.dataset("filter_scale", projection.filter_scale);
   visit.dataset("target_basis", projection.target_basis);
 }
 

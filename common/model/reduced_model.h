@@ -173,6 +173,7 @@ struct TargetElasticityData {
 struct ProjectionData {
   RowMatrix shape_from_reduced;  ///< 3m x r, T, row 3i + axis
   RowMatrix reduced_from_shape;  ///< r x 3m, T^+
+  Eigen::VectorXd filter_scale;  ///< [m] of a body of several densities, else empty: W^T u = s (x) I3 times T u
   RowMatrix target_basis;        ///< r x d, orthonormal basis of the poses that descriptors stand for, d <= min(r, 3m)
 };
 

@@ -7,7 +7,9 @@
 
 #include "common/core/log.h"
 #include "common/mesh/geometry.h"
+#include "common/model/example_pull.h"
 #include "precompute/examples/function_counter.h"
+#include "precompute/shape_space/filter_functions.h"
 #include "precompute/shape_space/projection.h"
 #include "precompute/shape_space/region_poses.h"
 #include "precompute/shape_space/region_window.h"
@@ -137,13 +139,13 @@ Eigen::VectorXd PoseFitter::tet_shares(Eigen::Index index) const {
   return region_tet_shares(object_.mesh, view->inside(), view->window());
 }
 
-// The basis through the filter of the example force, then the space: U^T P Y = T^+ (T Y).
+// The basis through the filter of the example force, then the space: U^T P Y.
 Eigen::MatrixXd PoseFitter::pull(std::size_t index, const ProjectionData& projection,
                                  const TargetSpace& targets) const {
   const ExampleGroup& group = stage_.groups[index];
   RowMatrix displacements = system_.extend(targets.coordinates.basis);
   if (group.view) displacements = group.view->see(displacements);
-  return projection.reduced_from_shape * shape_changes(stage_.object, stage_.weights, displacements);
+  return pull_from_shape(projection) * shape_changes(stage_.object, stage_.weights, displacements);
 }
 
 PoseFitter::Finished PoseFitter::finish_group(std::size_t index, const ReducedModel& model) const {
@@ -152,6 +154,8 @@ PoseFitter::Finished PoseFitter::finish_group(std::size_t index, const ReducedMo
   const bool whole = group.region.empty();
   Finished finished{group.examples, direct_projection(stage_.object, stage_.weights, system_.full_mass,
                                                       whole ? basis : RowMatrix(group.view->see(basis)))};
+  finished.projection.filter_scale =
+      filter_scale(stage_.object, stage_.weights, {stage_.object, object_.mesh, object_.materials.density});
   const RowMatrix map = whole && !system_.constrained() ? finished.projection.reduced_from_shape
                                                         : pose_map(poses_[index], system_, basis);
   finished.projection.target_basis = range_basis(map);

@@ -8,14 +8,12 @@ Eigen::MatrixXd filter_coefficients(const RowMatrix& filter, const Eigen::Vector
   return filter.transpose() * displacements.reshaped<Eigen::RowMajor>(filter.rows(), 3);
 }
 
-std::optional<FullSpaceData> full_space_data(const ReducedModel& model, const ElasticSystem& system,
-                                             const RegionView* view, const ExampleSet& examples,
-                                             const TargetSpace& targets, bool elastic) {
+FullSpaceData full_space_data(const ReducedModel& model, const ElasticSystem& system, const RegionView* view,
+                              const ExampleSet& examples, const TargetSpace& targets, bool elastic) {
   const ObjectData& body = *model.object;
   const LaplaceBasis object = laplace_basis_of(model);
   const FilterFunctions functions(object, body.mesh, body.materials.density);
-  if (!functions.symmetric) return std::nullopt;
-  const double root = functions.root_over_analysis();
+  const double root = functions.root_over_analysis;
   RowMatrix filter = root * functions.analysis;
   FullSpaceData data;
   if (view == nullptr && model.skeleton && model.skeleton->shifts.rows() > 0) {

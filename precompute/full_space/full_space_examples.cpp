@@ -102,7 +102,6 @@ void FullSpaceExamples::set_filter(const ReducedModel& model, const ExampleSet& 
     std::vector<std::int32_t> free_vertices;
     for (std::size_t i = 0; i < free_dofs_.size(); i += 3) free_vertices.push_back(free_dofs_[i] / 3);
     filter_.analysis = RowMatrix(filter_.analysis(free_vertices, Eigen::all));
-    filter_.synthesis = RowMatrix(filter_.synthesis(free_vertices, Eigen::all));
   }
   const RowMatrix slopes = weight_slopes(object, model.shape_space->weighting, set);
   weights_ = runtime::ExampleWeights(set.gram, set.h0, slopes);
@@ -145,27 +144,22 @@ Eigen::VectorXd FullSpaceExamples::weights(const Eigen::VectorXd& u) const {
 }
 
 Eigen::VectorXd FullSpaceExamples::filter(const Eigen::VectorXd& u) const {
-  return force(filter_.synthesis, coefficients(filter_.analysis, u));
+  return std::pow(filter_.root_over_analysis, 2) * force(filter_.analysis, coefficients(filter_.analysis, u));
 }
 
-std::optional<FullSpaceExamples::Root> FullSpaceExamples::root() const {
-  if (!filter_.symmetric) return std::nullopt;
+FullSpaceExamples::Root FullSpaceExamples::root() const {
   Root root{RowMatrix::Zero(vertices_, filter_.analysis.cols()), {}};
   if (view_) root.band = view_->band();
   for (std::size_t i = 0; i < free_dofs_.size(); i += 3) {
     const Eigen::Index vertex = free_dofs_[i] / 3, row = view_ ? vertex : static_cast<Eigen::Index>(i / 3);
     const double window = view_ ? view_->window()[vertex] : 1;
-    root.filter.row(vertex) = window * filter_.root_over_analysis() * filter_.analysis.row(row);
+    root.filter.row(vertex) = window * filter_.root_over_analysis * filter_.analysis.row(row);
   }
   return root;
 }
 
 Eigen::VectorXd FullSpaceExamples::root_coefficients(const Eigen::VectorXd& u) const {
-  return filter_.root_over_analysis() * flat(coefficients(filter_.analysis, u));
-}
-
-Eigen::VectorXd FullSpaceExamples::transposed_filter(const Eigen::VectorXd& u) const {
-  return force(filter_.analysis, coefficients(filter_.synthesis, u));
+  return filter_.root_over_analysis * flat(coefficients(filter_.analysis, u));
 }
 
 }  // namespace exmat::precompute

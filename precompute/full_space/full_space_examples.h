@@ -36,7 +36,7 @@ ExamplePoses known_example_poses(const ReducedModel& model, const std::string& r
 
 /// Example forces without a modal basis, of which those of docs/step_in_detail.md, "Target", are the Galerkin
 /// projection: with the m eigenfunctions Phi of the shape space, T u = Lambda Phi^T (M_s/V) u / V^(1/3), and the filter
-/// P u = M Phi Phi^T (M_s/V) u, U^T P U = T^+ T, and of a region D''^T P D''. f free degrees of freedom, K examples.
+/// P = W W^T (FilterFunctions), U^T P U = P_s, and of a region D''^T P D''. f free degrees of freedom, K examples.
 /// All elements take part in the energies of the target.
 class FullSpaceExamples {
  public:
@@ -54,17 +54,14 @@ class FullSpaceExamples {
   /// [K] weights of the deformation u [f], before the bias.
   Eigen::VectorXd weights(const Eigen::VectorXd& u) const;
 
-  /// P u and P^T u [f]; the same where density is uniform.
+  /// P u [f].
   Eigen::VectorXd filter(const Eigen::VectorXd& u) const;
-  Eigen::VectorXd transposed_filter(const Eigen::VectorXd& u) const;
-  bool symmetric() const { return filter_.symmetric; }
-  /// [n x m] W of P = W W^T (x) I3, of a region times its window, and [n] what it has of a band (RegionView::band());
-  /// none where P is not symmetric.
+  /// [n x m] W of P = W W^T (x) I3, of a region times its window, and [n] what it has of a band (RegionView::band()).
   struct Root {
     RowMatrix filter;
     Eigen::VectorXd band;
   };
-  std::optional<Root> root() const;
+  Root root() const;
   /// [3m] W^T u of what is seen of u [f], row 3i + axis.
   Eigen::VectorXd root_coefficients(const Eigen::VectorXd& u) const;
 

@@ -39,10 +39,9 @@ void add_space(const ReducedModel& data, FullSpaceModel& full) {
   RowMatrix functions(full.rest.rows(), 0);
   std::vector<runtime::FullExamples> groups;
   for (const FullSpaceExamples& examples : full.examples) {
-    const auto root = examples.root();
-    if (!root) break;
+    const FullSpaceExamples::Root root = examples.root();
     runtime::FullExamples& own = groups.emplace_back();
-    runtime::append_functions(root->filter, root->band, full.rest, own, functions);
+    runtime::append_functions(root.filter, root.band, full.rest, own, functions);
     own.is_elastic = true;
   }
   full.matrix_free = runtime::FullModel(runtime::FullSpace(object.mesh, object.materials, object.fixed, functions));
@@ -50,7 +49,7 @@ void add_space(const ReducedModel& data, FullSpaceModel& full) {
     if (const auto& shares = full.examples[i].tet_shares())
       groups[i].shares = full.matrix_free.space.element_means(object.mesh, object.materials, *shares);
   full.matrix_free.examples = std::move(groups);
-  if (full.contacts) full.matrix_free.contacts.emplace(*data.contact, full.matrix_free.space);
+  if (data.contact) full.matrix_free.contacts.emplace(*data.contact, full.matrix_free.space);
   if (!full.system.constrained()) full.matrix_free.rigid.emplace(full.matrix_free.space, full.rest);
   full.matrix_free.set_frame_of_functions();
 }
@@ -64,10 +63,8 @@ FullSpaceModel build_full_space_model(const ReducedModel& model, const FullSpace
   full.rest = object.mesh.vertices;
   full.system = build_elastic_system(object.mesh, object.materials, object.fixed);
   full.elasticity = MeshElasticity(object.mesh, object.materials, full.system.free_dofs);
-  full.mass_values = full.elasticity.values_of(full.system.mass);
   full.gravity_load = full.system.restrict(full.system.unit_weights());
   if (!full.system.constrained()) full.frame.emplace(object.mesh, scalar_mass(object.mesh, object.materials.density));
-  if (model.contact) full.contacts.emplace(*model.contact, full.system.free_dofs);
   add_examples(model, options, full);
   add_space(model, full);
   return full;
@@ -100,6 +97,10 @@ FullSpaceState make_full_space_state(const FullSpaceModel& model, const Eigen::V
     velocity.segment<3>(3 * i) = motion.linear_velocity + motion.angular_velocity.cross(arm);
   }
   return make_full_space_state(model, displacement, velocity);
+}
+
+Eigen::VectorXd deformation(const FullSpaceModel& model, const Eigen::VectorXd& q) {
+  return model.frame ? model.frame->deformation(model.frame->place(q)) : q;
 }
 
 VertexArray world_positions(const FullSpaceModel& model, const FullSpaceState& state) {

@@ -12,7 +12,6 @@
 #include "precompute/full_space/full_space_examples.h"
 #include "precompute/full_space/mesh_elasticity.h"
 #include "precompute/full_space/target_method.h"
-#include "precompute/full_space/vertex_contacts.h"
 #include "runtime/sim/space/full/full_model.h"
 #include "runtime/sim/step/scene.h"
 #include "runtime/sim/step/state.h"
@@ -25,15 +24,13 @@ struct FullSpaceModel {
   VertexArray rest;                         ///< n x 3 [m]
   ElasticSystem system;                     ///< consistent mass, f x f and 3n x 3n
   MeshElasticity elasticity;                ///< all tets
-  Eigen::VectorXd mass_values;              ///< values of the mass matrix on the pattern of the stiffness [kg]
   Eigen::MatrixXd gravity_load;             ///< f x 3, force per unit acceleration along each axis [kg]
   std::optional<FittedFrame> frame;         ///< present for a free body
-  std::optional<VertexContacts> contacts;   ///< present for a bundle with /contact
   std::vector<FullSpaceExamples> examples;  ///< the whole body's, if they are asked for, then the regions'
   /// In place of the targets of `examples`, one for each of them; or none.
   std::vector<std::shared_ptr<const TargetMethod>> target_methods;
 
-  /// The same elements for MatrixFreeStepper; without examples where their filters are not symmetric.
+  /// The same elements for FullSpaceStepper.
   runtime::FullModel matrix_free;
 
   Eigen::Index size() const { return elasticity.size(); }
@@ -68,6 +65,9 @@ FullSpaceState make_full_space_state(const FullSpaceModel& model, const Eigen::V
 /// mass c at rest.
 FullSpaceState make_full_space_state(const FullSpaceModel& model, const Eigen::VectorXd& deformation,
                                      const runtime::FrameMotion& motion);
+
+/// [f] what displacements q [f] deform: of a free body in the frame that fits it, of a clamped one all.
+Eigen::VectorXd deformation(const FullSpaceModel& model, const Eigen::VectorXd& q);
 
 /// [n x 3] world positions [m] and velocities [m/s] of all vertices.
 VertexArray world_positions(const FullSpaceModel& model, const FullSpaceState& state);

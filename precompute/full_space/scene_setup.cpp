@@ -36,7 +36,7 @@ void require_supported(const SceneConfig& config, const std::vector<VertexForceC
       throw InputError({config.bundle.string(), group, "this group, since the scene needs it", "none",
                         "precompute the bundle again with this scene (--scene)"});
   };
-  require_part(!config.obstacles.empty(), model.contacts.has_value(), "/contact");
+  require_part(!config.obstacles.empty(), model.matrix_free.contacts.has_value(), "/contact");
   const std::size_t groups = (config.examples ? 1 : 0) + config.regions.size();
   require_part(groups > 0, model.examples.size() == groups, config.examples ? "/examples" : "/regions");
   std::vector<Eigen::Index> examples;

@@ -124,7 +124,6 @@ class Pipeline {
   void add_contact(ReducedModel& model);
   void settle_examples(const BodyStages& stages, ReducedModel& model);
   void add_full_space(const BodyStages& stages, ReducedModel& model);
-  void refuse_full_space();
   void add_fidelity(const BodyStages& stages, const Motions& motions, const BasisChoice& choice, ReducedModel& model);
 
   const AssetConfig& asset_;
@@ -426,21 +425,8 @@ void Pipeline::add_full_space(const BodyStages& stages, ReducedModel& model) {
     if (wanted)
       data = full_space_data(model, stages.system, stages.fitter->view(group),
                              whole ? *model.examples : region->examples, stages.targets[at], stages.elastic[at]);
-    if (wanted && !data) return refuse_full_space();
     if (!whole) ++region;
   }
-}
-
-void Pipeline::refuse_full_space() {
-  const std::string reason = "parts of the body have several densities";
-  if (object_.skeleton)
-    throw InputError({asset_.file.string(), "/object/material", "one density of all parts of a body on bones",
-                      "several", "a body on bones, or whose clamp follows examples, steps in all vertices"});
-  if (scene_ != nullptr && scene_->space.space != Space::kReduced)
-    throw InputError({scene_->file.string(), scene_->place + "/space", "\"reduced\", since " + reason,
-                      fmt::format("\"{}\"", name_of(scene_->space.space)),
-                      "give all parts of the asset one density, or take space \"reduced\""});
-  leave_out("full_space", reason);
 }
 
 std::string generator() { return fmt::format("exmat-precompute {}", version()); }

@@ -251,7 +251,7 @@ void PoseSettler::add_shift(double strength, Eigen::Index k, Shifts& shifts) con
     runtime::TargetTable::Workspace workspace = force.table->make_workspace();
     Eigen::VectorXd pull(plain_.model->modes());
     force.table->evaluate(weights, workspace, pull);
-    shifts.pull.col(k) = share * (pull - force.filter.matrix() * *q);
+    shifts.pull.col(k) = share * (pull - force.filter * *q);
   }
   if (!model_.full_space) return;
   TargetTableData data = *model_.targets;

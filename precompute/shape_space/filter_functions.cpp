@@ -6,17 +6,16 @@
 #include "precompute/shape_space/projection.h"
 
 namespace exmat::precompute {
-namespace {
-
-// Relative difference of P and its transpose that is rounding.
-constexpr double kSymmetric = 1e-12;
-
-}  // namespace
 
 FilterFunctions::FilterFunctions(const LaplaceBasis& object, const TetMesh& mesh, const Eigen::VectorXd& density)
-    : analysis(object.mass * object.eigenfunctions), synthesis(scalar_mass(mesh, density) * object.eigenfunctions) {
-  const double ratio = synthesis.norm() / analysis.norm();
-  symmetric = (synthesis - ratio * analysis).norm() <= kSymmetric * synthesis.norm();
+    : analysis(object.mass * object.eigenfunctions),
+      root_over_analysis(std::sqrt(scalar_mass(mesh, density).sum())),
+      is_uniform((density.array() == density[0]).all()) {}
+
+Eigen::VectorXd filter_scale(const LaplaceBasis& object, const Eigen::VectorXd& weights,
+                             const FilterFunctions& functions) {
+  if (functions.is_uniform) return {};
+  return functions.root_over_analysis * std::cbrt(object.volume) * weights.cwiseInverse();
 }
 
 RowMatrix weight_slopes(const LaplaceBasis& object, Weighting weighting, const ExampleSet& set) {

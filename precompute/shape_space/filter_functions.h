@@ -7,19 +7,20 @@
 
 namespace exmat::precompute {
 
-/// The filter of the example force on displacements of n vertices, in each axis: P u = M Phi Phi^T (M_s/V) u, M the
-/// mass and M_s that of density 1. docs/method.md, "Direct projection".
+/// The filter of the example force on displacements of n vertices, in each axis: P = W W^T, W = m^(1/2) (M_s/V) Phi, m
+/// the mass of the body and M_s the mass matrix of density 1. docs/method.md, "Force".
 struct FilterFunctions {
-  RowMatrix analysis;     ///< n x m, (M_s/V) Phi
-  RowMatrix synthesis;    ///< n x m, M Phi
-  bool symmetric = true;  ///< P is: where density is uniform
+  RowMatrix analysis;             ///< n x m, (M_s/V) Phi
+  double root_over_analysis = 0;  ///< m^(1/2) [kg^(1/2)]
+  bool is_uniform = true;         ///< true if all tets have one density
 
   FilterFunctions() = default;
   FilterFunctions(const LaplaceBasis& object, const TetMesh& mesh, const Eigen::VectorXd& density);
-
-  /// W over `analysis`, with P = W W^T, of a symmetric filter [kg^(1/2)].
-  double root_over_analysis() const { return std::sqrt(synthesis.norm() / analysis.norm()); }
 };
+
+/// [m] ProjectionData::filter_scale of descriptors of these weights.
+Eigen::VectorXd filter_scale(const LaplaceBasis& object, const Eigen::VectorXd& weights,
+                             const FilterFunctions& functions);
 
 /// [K x 3m] slopes of the load of the weights problem in Phi^T (M_s/V) u, row 3i + axis: h = h0 + slopes c.
 RowMatrix weight_slopes(const LaplaceBasis& object, Weighting weighting, const ExampleSet& set);

@@ -6,8 +6,7 @@
 
 #include "common/core/progress.h"
 #include "common/core/timer.h"
-#include "precompute/full_space/matrix_free_stepper.h"
-#include "precompute/full_space/step_potential.h"
+#include "precompute/full_space/full_space_stepper.h"
 
 namespace exmat::precompute {
 namespace {
@@ -79,7 +78,7 @@ ChainRun ChainRunner::run(const Chain& chain, Advance advance) {
       ++result.steps;
       advance(1);
       if (!sound || (i + 1) % kStepsPerSnapshot != 0) continue;
-      result.snapshots.push_back(Deformation(model_, state.q).u());
+      result.snapshots.push_back(deformation(model_, state.q));
       if (options_.positions) result.displacements.push_back(state.q);
     }
     ++(sound ? result.segments : result.skipped);

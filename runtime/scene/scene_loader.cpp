@@ -364,7 +364,7 @@ void describe_examples(const ExampleModel& examples, const ExampleSettings& sett
     plan.push_back(owner + "weights, target, example_force: left out, stiffness and damping are 0");
     return;
   }
-  const Eigen::Index modes = examples.filter.matrix().rows();
+  const Eigen::Index modes = examples.filter.rows();
   plan.push_back(
       owner +
       (settings.given_weights.size() > 0 ? fmt::format("weights: K = {} examples, given", examples.weights.examples())
@@ -377,9 +377,9 @@ void describe_examples(const ExampleModel& examples, const ExampleSettings& sett
   if (settings.elastic)
     plan.push_back(owner + fmt::format("example_force: elastic, s = {} elements", examples.elasticity->elements()));
   if (!is_filtered(settings)) return;
-  plan.push_back(owner + fmt::format("{}: linear, {} filter of {} x {}",
-                                     settings.elastic ? "damping of the example_force" : "example_force",
-                                     examples.filter.is_symmetric() ? "symmetric" : "unsymmetric", modes, modes));
+  plan.push_back(owner + fmt::format("{}: linear, symmetric filter of {} x {}",
+                                     settings.elastic ? "damping of the example_force" : "example_force", modes,
+                                     modes));
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ void add_solver(const TargetSolver& solver, int iterations, StepWork& work) {
 
 /// Adds the work of one example force.
 void add_examples(const ExampleModel& examples, int target_iterations, const StepReport& report, StepWork& work) {
-  const Eigen::Index modes = examples.filter.matrix().rows(), count = examples.weights.examples();
+  const Eigen::Index modes = examples.filter.rows(), count = examples.weights.examples();
   const auto numbers = static_cast<double>(count * (modes + count));  // load, and the slopes of one turn
   work.weights_flops += 2 * numbers;
   work.bytes += doubles(numbers);
@@ -42,9 +42,8 @@ void add_examples(const ExampleModel& examples, int target_iterations, const Ste
     add_table(*examples.table, work);
   else
     add_solver(*examples.target, target_iterations, work);
-  const double passes = examples.filter.is_symmetric() ? 1 : 1 + evaluations(report);  // over the filter
-  work.other_flops += passes * 2 * square(modes);
-  work.bytes += doubles((1 + passes) * square(modes));
+  work.other_flops += 2 * square(modes);
+  work.bytes += doubles(2 * square(modes));
 }
 
 /// The report counts the iterations of all targets together: each that is solved for is taken to need as many.

@@ -5,7 +5,7 @@
 #include "common/bundle/bundle.h"
 #include "common/config/config.h"
 #include "common/hdf5/hdf5_file.h"
-#include "precompute/full_space/matrix_free_stepper.h"
+#include "precompute/full_space/full_space_stepper.h"
 #include "precompute/full_space/scene_setup.h"
 #include "runtime/scene/obstacle_loader.h"
 #include "runtime/scene/scene_loader.h"

@@ -45,12 +45,12 @@ TEST_F(ReferenceFiles, ExamplePosesAreThoseOfTheBundleBeforeTheirReduction) {
 /// RMS distance of the reduced trajectory from that of the full space, relative to the RMS displacement, M-norm.
 double trajectory_error(const SceneConfig& config, const ReducedModel& data, int steps) {
   const auto loaded = runtime::load_run(config);
-  const auto model = precompute::build_full_space_model(data, precompute::full_space_options(config));
+  const auto model = precompute::build_sparse_model(data, precompute::full_space_options(config));
   const auto scene = precompute::full_space_scene(config, runtime::make_obstacles(config), model);
   runtime::State reduced = loaded.start;
   runtime::Workspace reduced_workspace(*loaded.model, loaded.scene);
   auto state = precompute::full_space_start(config, model, data.modal->basis * reduced.q);
-  precompute::FullSpaceWorkspace workspace(model);
+  precompute::SparseWorkspace workspace(model);
   double distance = 0, size = 0;
   for (int i = 0; i < steps; ++i) {
     EXPECT_EQ(runtime::step(*loaded.model, loaded.scene, reduced, reduced_workspace).status, 0U) << i;
@@ -82,7 +82,7 @@ TEST_F(ReferenceFiles, AReducedSceneComesNearerToTheFullOneWithMoreModes) {
 TEST_F(ReferenceFiles, RefusesWhatItCannotDo) {
   ReducedModel data = built(8);
   data.contact.reset();
-  const auto model = precompute::build_full_space_model(data);
+  const auto model = precompute::build_sparse_model(data);
   for (const Json& members :
        {R"({"body": {"motion": [{"time": 0, "position": [0, 0, 0]}, {"time": 1, "position": [1, 0, 0]}]}})"_json,
         R"({"examples": {"stiffness": 1}})"_json, R"({"obstacles": [{"plane": {"normal": [0, 1, 0]}}]})"_json,

@@ -5,13 +5,13 @@
 
 #include "common/core/error.h"
 #include "common/mesh/geometry.h"
-#include "precompute/full_space/step_potential.h"
 #include "tests/paper/minimiser.h"
 #include "tests/paper/surface_energy.h"
 #include "tests/paper/surface_targets.h"
 #include "tests/precompute/full_space/full_space_bar.h"
 #include "tests/support/box_mesh.h"
 #include "tests/support/random.h"
+#include "tests/support/sparse_space/step_potential.h"
 
 namespace exmat::precompute {
 namespace {
@@ -120,12 +120,12 @@ TEST_F(SurfaceEnergyTest, RefusesAnOpenSurface) {
 struct Baseline {
   explicit Baseline(bool free = false, MaterialModel material = MaterialModel::kStVenantKirchhoff)
       : bar(test::make_bar({.cells = {4, 2, 2}, .material = material, .free = free, .examples = 3})),
-        model(build_full_space_model(bar.model, {.whole_body = true})) {
+        model(build_sparse_model(bar.model, {.whole_body = true})) {
     use_surface_targets(*bar.model.object, model);
   }
 
   test::Bar bar;
-  FullSpaceModel model;
+  SparseModel model;
 };
 
 TEST(SurfaceTargets, GradientIsTheDerivative) {
@@ -171,8 +171,8 @@ TEST(Baseline, ABodyTakesTheShapeOfTheTarget) {
     scene.mass_damping = 5;
     scene.examples = {{.stiffness = 50, .bias = 0, .elastic = true}};
     FullSpaceState state = at_rest(baseline.model);
-    FullSpaceWorkspace workspace(baseline.model);
-    FullSpaceReport report;
+    SparseWorkspace workspace(baseline.model);
+    SparseReport report;
     for (int i = 0; i < 150; ++i) {
       report = step(baseline.model, scene, state, workspace);
       ASSERT_FALSE(report.status & runtime::kStepNonFinite) << i;

@@ -7,6 +7,7 @@
 #include "precompute/solvers/ranks.h"
 #include "runtime/scene/samples.h"
 #include "tests/paper/baseline.h"
+#include "tests/support/sparse_space/sparse_model.h"
 
 namespace {
 
@@ -20,10 +21,11 @@ void time_baseline(const std::string& file, int steps) {
   const ReducedModel data = read_bundle(scene.bundle);
   precompute::FullSpaceRun run(scene, data);
   precompute::make_baseline(data, run);
-  precompute::FullSpaceWorkspace workspace(run.model);
+  const precompute::SparseModel model(run.model, data);
+  precompute::SparseWorkspace workspace(model);
   runtime::Samples whole(steps), interpolation(steps);
   for (int i = 0; i < steps; ++i) {
-    const precompute::FullSpaceReport report = precompute::step(run.model, run.scene, run.state, workspace);
+    const precompute::SparseReport report = precompute::step(model, run.scene, run.state, workspace);
     if (report.status & runtime::kStepNonFinite) throw WorkError("a number that is not finite");
     whole.add(report.seconds);
     if (report.target_iterations > 0) interpolation.add(report.target_seconds);

@@ -245,7 +245,7 @@ Eigen::MatrixXd times_identity(const RowMatrix& matrix) {
   return product;
 }
 
-ProjectionData projection(const ShapeSpaceData& space, const FullMatrices& full, const ModalData& modal) {
+ProjectionData projection(const ShapeSpaceData& space, const FullMatrices& full, const ModalData& modal, bool uniform) {
   const double scale = std::cbrt(space.volume);
   const RowMatrix scalar_mass = full.scalar_mass;
   const Eigen::MatrixXd phi = times_identity(space.eigenfunctions);
@@ -254,6 +254,8 @@ ProjectionData projection(const ShapeSpaceData& space, const FullMatrices& full,
   data.shape_from_reduced =
       weights.asDiagonal() * (phi.transpose() * (times_identity(scalar_mass) * modal.basis)) / space.volume / scale;
   data.reduced_from_shape = modal.basis.transpose() * (full.mass * phi) * weights.cwiseInverse().asDiagonal() * scale;
+  const Eigen::MatrixXd ones = Eigen::MatrixXd::Ones(full.mass.cols(), 1);
+  if (!uniform) data.filter_scale = std::sqrt((full.mass * ones).sum() / 3) * scale * space.eigenvalues.cwiseInverse();
   Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(data.reduced_from_shape);
   qr.setThreshold(1e-10);
   data.target_basis = Eigen::MatrixXd(qr.householderQ()).leftCols(qr.rank());
@@ -322,7 +324,7 @@ Bar make_bar(const BarOptions& options) {
   if (options.free || options.carried) model.rigid = rigid_data(*model.object, full, *model.modal);
   if (options.examples > 0) {
     model.shape_space = shape_space(*model.object, full, options.eigenfunctions);
-    model.projection = projection(*model.shape_space, full, *model.modal);
+    model.projection = projection(*model.shape_space, full, *model.modal, options.density_gradient == 0);
     model.examples = example_set(*model.shape_space, *model.projection, full, bar.example_fields);
   }
   bar.mass = full.mass;

@@ -6,7 +6,7 @@
 
 #include "common/config/scene_config.h"
 #include "common/model/reduced_model.h"
-#include "precompute/full_space/matrix_free_stepper.h"
+#include "precompute/full_space/full_space_stepper.h"
 #include "precompute/study/measure/frames.h"
 #include "runtime/scene/scene_loader.h"
 

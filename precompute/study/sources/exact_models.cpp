@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/core/error.h"
+#include "common/model/example_pull.h"
 #include "precompute/cubature/cubature.h"
 #include "precompute/cubature/element_samples.h"
 #include "precompute/examples/example_stage.h"
@@ -84,7 +85,7 @@ RowMatrix pull_of(const ReducedModel& model, const ElasticSystem& system, const 
   const LaplaceBasis object = laplace_basis_of(model);
   RowMatrix displacements = system.extend(coordinates.basis);
   if (!region.empty()) displacements = known_example_poses(model, region, coordinates).view.value().see(displacements);
-  return projection.reduced_from_shape *
+  return pull_from_shape(projection) *
          shape_changes(object, descriptor_weights(object, model.shape_space->weighting), displacements);
 }
 

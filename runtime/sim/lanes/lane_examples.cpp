@@ -4,7 +4,7 @@ namespace exmat::runtime {
 
 LaneExamples::LaneExamples(const ExampleModel& model)
     : load_(model.weights.examples() * kLanes), weights_(model.weights.examples() * kLanes) {
-  const Eigen::MatrixXd& filter = model.filter.matrix();
+  const Eigen::MatrixXd& filter = model.filter;
   const Eigen::Index modes = filter.rows();
   pull_ = product_ = AlignedArray(modes * kLanes);
   filter_ = AlignedArray(lane_triangle(modes) / kLanes);
@@ -41,7 +41,7 @@ void LaneExamples::find_targets(const ExampleModel& model) noexcept {
 
 void LaneExamples::add_force(const ExampleModel& model, const LaneNumbers& factor, const LaneNumbers& stiffness,
                              AlignedArray& offset, AlignedArray& linear, AlignedArray& quadratic) noexcept {
-  const Eigen::MatrixXd& filter = model.filter.matrix();
+  const Eigen::MatrixXd& filter = model.filter;
   const Eigen::Index modes = filter.rows();
   kernels().lanes_matrix_product(filter.data(), modes, modes, filter.outerStride(), offset.data(), product_.data());
   LaneVectors sum(linear.data(), kLanes, modes);

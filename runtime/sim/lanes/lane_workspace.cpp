@@ -1,17 +1,13 @@
 #include "runtime/sim/lanes/lane_workspace.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace exmat::runtime {
 
 bool can_step_side_by_side(const Model& model, const StepScene& scene) noexcept {
   if (model.internal_force.polynomial()) return false;
-  for (std::size_t i = 0; i < scene.examples.size(); ++i) {
-    const ExampleSettings& examples = scene.examples[i];
-    if (elastic_factor(examples) > 0) return false;
-    if (is_filtered(examples) && !model.examples[i].filter.is_symmetric()) return false;
-  }
-  return true;
+  return std::ranges::none_of(scene.examples, [](const ExampleSettings& own) { return elastic_factor(own) > 0; });
 }
 
 LaneWorkspace::LaneWorkspace(const Model& model, const StepScene& scene, std::size_t bodies)

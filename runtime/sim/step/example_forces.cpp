@@ -78,7 +78,7 @@ void add_example_forces(const Model& model, const StepScene& scene, const State&
     const ExampleSettings& settings = scene.examples[i];
     if (!is_filtered(settings)) continue;
     workspace.offset = linear_stiffness(settings) * state.q + settings.damping * state.v;
-    force.noalias() -= model.examples[i].filter.matrix() * workspace.offset;
+    force.noalias() -= model.examples[i].filter * workspace.offset;
     force += linear_stiffness(settings) * workspace.examples[i].target;
   }
   workspace.offset.setZero();

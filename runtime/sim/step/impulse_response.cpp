@@ -74,7 +74,7 @@ void ImpulseResponse::add_example_stiffness(double h, Tangent tangent, Eigen::Re
   for (std::size_t i = 0; i < scene_.examples.size(); ++i) {
     const ExampleSettings& settings = scene_.examples[i];
     if (is_filtered(settings)) {
-      const auto& filter = model_.examples[i].filter.symmetric_part();
+      const auto& filter = model_.examples[i].filter;
       A += h * (h * linear_stiffness(settings) + settings.damping) * filter;
       stiffness_ += linear_stiffness(settings) * filter;
     }

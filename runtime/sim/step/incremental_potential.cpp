@@ -11,22 +11,11 @@ namespace {
 constexpr double kSmallRatio = 0.1;  // of inertia: beyond it a factorisation costs less than the terms of a series
 constexpr double kGyroscopicError = 1e-5;  // of a direction, by the terms that are left out
 
-bool has_skew_forces(const Model& model, const StepScene& scene) noexcept {
-  for (std::size_t i = 0; i < scene.examples.size(); ++i)
-    if (is_filtered(scene.examples[i]) && !model.examples[i].filter.is_symmetric()) return true;
-  return false;
-}
-
 }  // namespace
 
 IncrementalPotential::IncrementalPotential(const Model& model, const StepScene& scene, const State& state,
                                            Workspace& workspace) noexcept
-    : model_(model),
-      scene_(scene),
-      state_(state),
-      workspace_(workspace),
-      skew_(has_skew_forces(model, scene)),
-      frame_forces_(model.frame->exerts_forces()) {
+    : model_(model), scene_(scene), state_(state), workspace_(workspace), frame_forces_(model.frame->exerts_forces()) {
   for (const ExampleSettings& examples : scene.examples) elastic_examples_ += elastic_factor(examples);
 }
 
@@ -97,10 +86,10 @@ void IncrementalPotential::add_example_forces() noexcept {
   for (std::size_t i = 0; i < scene_.examples.size(); ++i) {
     if (!is_filtered(scene_.examples[i])) continue;
     const ExampleForce& example = workspace_.examples[i].force;
-    const ShapeFilter& filter = model_.examples[i].filter;
-    used += example.stiffness * filter.symmetric_part();
+    const Eigen::MatrixXd& filter = model_.examples[i].filter;
+    used += example.stiffness * filter;
     workspace_.offset = example.stiffness * (state_.q - example.centre);
-    g.noalias() += filter.matrix() * workspace_.offset;
+    g.noalias() += filter * workspace_.offset;
     g -= example.pull;
   }
 }
@@ -139,7 +128,7 @@ void IncrementalPotential::hessian(const Eigen::VectorXd& q, Tangent tangent, Ei
 }
 
 void IncrementalPotential::accept(PotentialEvaluation& evaluation) noexcept {
-  if (!has_frozen_force()) return;
+  if (!frame_forces_) return;
   workspace_.frozen_force.swap(workspace_.next_frozen_force);
   evaluation.potential.value +=
       workspace_.frozen_force.dot(workspace_.offset) - workspace_.next_frozen_force.dot(workspace_.offset);
@@ -165,7 +154,7 @@ PotentialEvaluation IncrementalPotential::assemble(const Eigen::VectorXd& q, Eig
   const double rounding = force_rounding_ * q.norm() / scene_.newton.tolerance;
   PotentialEvaluation evaluation{
       quadratic(energy), workspace_.external_force.norm() + workspace_.internal_force.norm() + inertia + rounding};
-  if (has_frozen_force()) {
+  if (frame_forces_) {
     if (!update_frozen_force(q)) evaluation.potential.value = std::numeric_limits<double>::infinity();
     gradient += workspace_.next_frozen_force;
   }
@@ -175,11 +164,6 @@ PotentialEvaluation IncrementalPotential::assemble(const Eigen::VectorXd& q, Eig
 /// Writes the forces without a potential at q to next_frozen_force. False where the frame has no motion for it.
 bool IncrementalPotential::update_frozen_force(const Eigen::VectorXd& q) noexcept {
   workspace_.next_frozen_force.setZero();
-  for (std::size_t i = 0; skew_ && i < scene_.examples.size(); ++i)
-    if (is_filtered(scene_.examples[i]))
-      workspace_.next_frozen_force.noalias() +=
-          workspace_.examples[i].force.stiffness * (model_.examples[i].filter.skew_part() * workspace_.offset);
-  if (!frame_forces_) return true;
   const StepForm& form = workspace_.form;
   const bool found = model_.frame->update_force(q, form.velocity_factor, form.velocity_centre, workspace_.frame);
   workspace_.next_frozen_force -= *model_.frame->force(workspace_.frame);
@@ -216,7 +200,7 @@ PotentialValue IncrementalPotential::quadratic(double elastic_energy) noexcept {
   const double square = 0.5 * workspace_.offset.dot(workspace_.product.head(workspace_.offset.size()));
   const double linear = workspace_.linear.dot(workspace_.offset);
   PotentialValue sum{elastic_energy + square + linear, std::abs(elastic_energy) + std::abs(square) + std::abs(linear)};
-  if (has_frozen_force()) sum.value += workspace_.frozen_force.dot(workspace_.offset);
+  if (frame_forces_) sum.value += workspace_.frozen_force.dot(workspace_.offset);
   return sum;
 }
 

@@ -14,10 +14,10 @@ namespace exmat::runtime {
 ///   + sum over the example forces of k/2 (q - q_c)^T P_s (q - q_c) - kappa g . q, or of k/2 ... + W(q) with k =
 ///   c_kappa c_v where they are elastic,
 /// D = alpha I + beta K(first iterate), up to a constant. All but E and W is one quadratic form of the step's
-/// displacement q - q_n, prepared once: an evaluation costs these and one product with a matrix. Two forces have no
-/// potential, that of the skew part of P_s and those of the frame (BodyFrame::force()): in values they are those of the
-/// iterate last accepted, so that the gradient is exact. docs/step_in_detail.md, "The incremental potential";
-/// ExampleForce. Reads form and external_force of the workspace.
+/// displacement q - q_n, prepared once: an evaluation costs these and one product with a matrix. The forces of the
+/// frame (BodyFrame::force()) have no potential: in values they are those of the iterate last accepted, so that the
+/// gradient is exact. docs/step_in_detail.md, "The incremental potential"; ExampleForce. Reads form and external_force
+/// of the workspace.
 class IncrementalPotential {
  public:
   IncrementalPotential(const Model& model, const StepScene& scene, const State& state, Workspace& workspace) noexcept;
@@ -64,14 +64,12 @@ class IncrementalPotential {
   PotentialValue quadratic(double elastic_energy) noexcept;
   void add_example_forces() noexcept;
   void add_quadratic(Eigen::MatrixXd& hessian) const noexcept;
-  bool has_frozen_force() const noexcept { return skew_ || frame_forces_; }
   double internal_flops(bool stiffness) const noexcept;
 
   const Model& model_;
   const StepScene& scene_;
   const State& state_;
   Workspace& workspace_;
-  bool skew_;
   bool frame_forces_;
   double elastic_examples_ = 0;  // sum of their factors
   bool at_first_iterate_ = true;

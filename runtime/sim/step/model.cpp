@@ -4,6 +4,8 @@
 #include <limits>
 #include <utility>
 
+#include "common/model/example_pull.h"
+
 namespace exmat::runtime {
 namespace {
 
@@ -47,7 +49,7 @@ std::optional<Complaint> add_solver(const RestModel& rest, const ExampleParts& p
   if (!parts.target_space) {
     auto complaint =
         solver.build(rest.material, rest.cubature, parts.set.examples, parts.projection.target_basis, reference);
-    examples.target_pull = examples.filter.matrix() * solver.basis();
+    examples.target_pull = examples.filter * solver.basis();
     return complaint;
   }
   const TargetSpaceData& space = *parts.target_space;
@@ -85,11 +87,17 @@ std::optional<Complaint> add_examples(const RestModel& rest, const ExampleParts&
   ExampleModel examples;
   examples.region = parts.region;
   examples.weights = ExampleWeights(parts.set.gram, parts.set.h0, parts.set.hq);
-  examples.filter = ShapeFilter(parts.projection);
+  const ProjectionData& projection = parts.projection;
+  if (const Eigen::Index seen = projection.filter_scale.size();
+      seen != 0 && 3 * seen != projection.shape_from_reduced.rows())
+    return Complaint{"", parts.group("/projection/filter_scale"), "none, or one for each eigenfunction",
+                     std::to_string(seen), "precompute the bundle again"};
+  const Eigen::MatrixXd filter = pull_from_shape(projection) * projection.shape_from_reduced;
+  examples.filter = 0.5 * (filter + filter.transpose());
   if (options.target_table) {
     if (!parts.targets) return missing_group(parts.group("/targets"));
     TargetTableData pull = *parts.targets;
-    if (!pull.is_pull) pull.control_points *= examples.filter.matrix().transpose();
+    if (!pull.is_pull) pull.control_points *= examples.filter.transpose();
     examples.table.emplace(pull);
   } else if (auto complaint = add_solver(rest, parts, options.energy_reference, examples)) {
     complaint->place = parts.group("") + complaint->place;

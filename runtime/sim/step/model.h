@@ -11,8 +11,8 @@
 #include "common/model/reduced_model.h"
 #include "runtime/sim/contact/contact.h"
 #include "runtime/sim/elasticity/internal_force.h"
+#include "runtime/sim/examples/example_force.h"
 #include "runtime/sim/examples/example_weights.h"
-#include "runtime/sim/examples/shape_filter.h"
 #include "runtime/sim/examples/target.h"
 #include "runtime/sim/examples/target_elasticity.h"
 #include "runtime/sim/examples/target_table.h"
@@ -30,7 +30,7 @@ struct ExampleModel {
   std::optional<TargetSolver> target;          ///< otherwise
   Eigen::MatrixXd target_pull;                 ///< r x d, with `target`: the pull of its coordinates y
   std::optional<TargetElasticity> elasticity;  ///< present for an elastic force
-  ShapeFilter filter;                          ///< P_s
+  Eigen::MatrixXd filter;                      ///< r x r, P_s = U^T P U, symmetric
 };
 
 /// A reduced body prepared for stepping: immutable, shared by any number of States.

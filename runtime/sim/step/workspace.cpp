@@ -24,7 +24,7 @@ ExampleWorkspace::ExampleWorkspace(const ExampleModel& model) : weights_solver(m
     solved_target.setZero(model.elasticity->dimension());
   }
   weights.setZero(model.weights.examples());
-  target.setZero(model.filter.matrix().rows());
+  target.setZero(model.filter.rows());
   force.centre = force.pull = target;
 }
 

@@ -293,7 +293,7 @@ ReducedModel small_model(bool constrained, bool with_examples) {
     model.shape_space = small_shape_space();
     model.examples = small_examples();
     model.projection = ProjectionData{numbers(3 * kEigenfunctions, kModes, 6), numbers(kModes, 3 * kEigenfunctions, 7),
-                                      numbers(kModes, 1, 8)};
+                                      Eigen::VectorXd::Constant(kEigenfunctions, 3), numbers(kModes, 1, 8)};
     model.targets = small_targets();
     model.target_space = small_target_space(kExamples);
     model.target_elasticity = small_target_elasticity(6);

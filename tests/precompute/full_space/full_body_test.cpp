@@ -50,7 +50,7 @@ class Twin {
       reference.regions = {{"outer"}, {"inner"}};
       reduced.regions = {{"outer"}, {"inner"}};
     }
-    reference_ = build_full_space_model(data, reference);
+    reference_ = build_sparse_model(data, reference);
     model_ = std::move(runtime::build_model(data, reduced).model);
     full_ = std::move(runtime::build_full_model(data, *model_).model);
     set_scene();
@@ -68,12 +68,12 @@ class Twin {
   double difference(int steps, const runtime::FullAccuracy& accuracy = {}) {
     runtime::Workspace workspace(*model_, scene_);
     runtime::FullWorkspace own(*full_, scene_, accuracy);
-    FullSpaceWorkspace reference_workspace(reference_);
+    SparseWorkspace reference_workspace(reference_);
     double off = 0, size = 0;
     for (int i = 0; i < steps; ++i) {
       const runtime::StepReport report = runtime::step_in_full_space(*full_, *model_, scene_, state_, workspace, own);
       EXPECT_EQ(report.status, 0U) << i;
-      const FullSpaceReport expected = step(reference_, reference_scene_, expected_, reference_workspace);
+      const SparseReport expected = step(reference_, reference_scene_, expected_, reference_workspace);
       EXPECT_EQ(expected.status, 0U) << i;
       contacts_ += report.contacts;
       EXPECT_NEAR(report.contacts, expected.contacts, options_.bar.free ? 2 : 0) << i;
@@ -151,7 +151,7 @@ class Twin {
 
   TwinOptions options_;
   test::Bar bar_;
-  FullSpaceModel reference_;
+  SparseModel reference_;
   std::unique_ptr<const runtime::Model> model_;
   std::unique_ptr<const runtime::FullModel> full_;
   FullSpaceScene reference_scene_;
@@ -179,6 +179,19 @@ TEST(FullBody, IsTheReferenceWithExamples) {
   EXPECT_LE(twin.difference(60), kSame);
   EXPECT_LE(twin.weights_off(), kSame);
   EXPECT_GE(twin.size(), 0.1);
+}
+
+TEST(FullBody, IsTheReferenceOfSeveralDensities) {
+  for (const bool regions : {false, true}) {
+    Twin twin({.bar = {.cells = {4, 1, 1}, .density_gradient = 3},
+               .integrator = Integrator::kBackwardEuler,
+               .examples = 3,
+               .regions = regions,
+               .damping = 0.5});
+    EXPECT_LE(twin.difference(60), kSame) << regions;
+    EXPECT_LE(twin.weights_off(), kSame) << regions;
+    EXPECT_GE(twin.size(), 0.1);
+  }
 }
 
 TEST(FullBody, IsTheReferenceWithElasticExamples) {

@@ -2,9 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include "precompute/full_space/full_space_stepper.h"
 #include "precompute/shape_space/filter_functions.h"
 #include "precompute/shape_space/projection.h"
+#include "tests/support/sparse_space/sparse_model.h"
 #include "tests/support/synthetic_model.h"
 
 namespace exmat::precompute {
@@ -47,6 +47,8 @@ inline void add_region(ReducedModel& model, const std::string& name, const FlagV
   added.band = view.band()(added.vertices);
   added.projection = direct_projection(basis, descriptor_weights(basis, model.shape_space->weighting), system.full_mass,
                                        RowMatrix(view.see(model.modal->basis)));
+  added.projection.filter_scale = filter_scale(basis, descriptor_weights(basis, model.shape_space->weighting),
+                                               FilterFunctions(basis, object.mesh, object.materials.density));
   const ExamplePoses poses = region_example_poses(model, system, {name}).front();
   reduce_examples(model, system, poses, added.projection, added.examples);
 }
@@ -75,11 +77,11 @@ inline FullSpaceData full_space_data_of(const ReducedModel& model, const RegionD
   const LaplaceBasis basis = laplace_basis_of(model);
   const FilterFunctions functions(basis, object.mesh, object.materials.density);
   FullSpaceData data;
-  data.filter = functions.root_over_analysis() * functions.analysis;
+  data.filter = functions.root_over_analysis * functions.analysis;
   for (Eigen::Index v = 0; v < object.fixed.size(); ++v)
     if (object.fixed[v] != 0) data.filter.row(v).setZero();
   data.slopes = weight_slopes(basis, model.shape_space->weighting, region ? region->examples : *model.examples) /
-                functions.root_over_analysis();
+                functions.root_over_analysis;
   data.from_target.resize(model.modal->basis.cols(), 3 * data.filter.cols());
   std::optional<RegionView> view;
   if (region != nullptr) {
@@ -113,12 +115,12 @@ inline void make_elastic(ReducedModel& model) {
 inline FullSpaceOptions targets_of(const test::BarOptions& options) { return {.whole_body = options.examples > 0}; }
 
 /// Steps, and expects each one to be sound.
-inline void run(const FullSpaceModel& model, const FullSpaceScene& scene, FullSpaceState& state, int steps) {
-  FullSpaceWorkspace workspace(model);
+inline void run(const SparseModel& model, const FullSpaceScene& scene, FullSpaceState& state, int steps) {
+  SparseWorkspace workspace(model);
   for (int i = 0; i < steps; ++i) ASSERT_EQ(step(model, scene, state, workspace).status, 0U) << i;
 }
 
-inline FullSpaceState at_rest(const FullSpaceModel& model) {
+inline FullSpaceState at_rest(const SparseModel& model) {
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(model.rest.size());
   return make_full_space_state(model, zero, zero);
 }

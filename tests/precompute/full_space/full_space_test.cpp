@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "common/core/error.h"
-#include "precompute/full_space/step_potential.h"
 #include "tests/precompute/full_space/full_space_bar.h"
 #include "tests/support/box_mesh.h"
 #include "tests/support/random.h"
+#include "tests/support/sparse_space/step_potential.h"
 
 namespace exmat::precompute {
 namespace {
@@ -19,7 +19,7 @@ constexpr std::array kIntegrators{Integrator::kBdf2, Integrator::kBackwardEuler,
 /// A free bar of a few tets that spins, flies and vibrates.
 struct FreeBar {
   explicit FreeBar(const test::BarOptions& options = {.cells = {3, 1, 1}, .free = true, .linear_modes = 8})
-      : bar(test::make_bar(options)), model(build_full_space_model(bar.model, targets_of(options))) {}
+      : bar(test::make_bar(options)), model(build_sparse_model(bar.model, targets_of(options))) {}
 
   FullSpaceState moving(double spin) const {
     const Eigen::VectorXd first = bar.basis().col(0) + 0.3 * bar.basis().col(3);
@@ -52,10 +52,10 @@ struct FreeBar {
   }
 
   test::Bar bar;
-  FullSpaceModel model;
+  SparseModel model;
 };
 
-double total_energy(const FullSpaceModel& model, const FullSpaceScene& scene, const FullSpaceState& state) {
+double total_energy(const SparseModel& model, const FullSpaceScene& scene, const FullSpaceState& state) {
   return energies(model, scene, state).total();
 }
 
@@ -107,11 +107,11 @@ TEST(FullSpace, KeepsLinearMomentumAndAngularMomentumToItsOrder) {
 /// Energies in ten periods of a bar that is let go, over the first one.
 std::vector<double> energies_of_vibration(Integrator integrator, int steps_per_period) {
   const test::Bar bar = test::make_bar({.cells = {4, 1, 1}});
-  const FullSpaceModel model = build_full_space_model(bar.model);
+  const SparseModel model = build_sparse_model(bar.model);
   const Eigen::VectorXd bent = 0.03 * bar.length / bar.basis().col(0).lpNorm<Eigen::Infinity>() * bar.basis().col(0);
   const FullSpaceScene scene = scene_of(integrator, 1 / (steps_per_period * bar.model.modal->frequencies[0]));
   FullSpaceState state = make_full_space_state(model, bent, Eigen::VectorXd::Zero(bent.size()));
-  FullSpaceWorkspace workspace(model);
+  SparseWorkspace workspace(model);
   const double start = total_energy(model, scene, state);
   std::vector<double> found;
   for (int i = 0; i < 10 * steps_per_period; ++i) {
@@ -159,7 +159,7 @@ double deflection(int along, double length, double width, double youngs_modulus,
   object.materials = {Eigen::VectorXd::Constant(tets, 1000), Eigen::VectorXd::Constant(tets, youngs_modulus),
                       Eigen::VectorXd::Zero(tets)};
   object.fixed = (object.mesh.vertices.col(0).array() < 1e-9).cast<std::uint8_t>();
-  const FullSpaceModel full = build_full_space_model(model);
+  const SparseModel full = build_sparse_model(model);
   FullSpaceScene scene = scene_of(Integrator::kBackwardEuler, 1e6);  // statics
   std::vector<std::int64_t> end;
   std::vector<double> shares;
@@ -199,10 +199,10 @@ TEST(FullSpace, ConvergesInTheElementSizeToTimoshenkosBeam) {
 
 TEST(FullSpace, ReportsWhatIsNotFiniteAndKeepsTheState) {
   const test::Bar bar = test::make_bar({.cells = {2, 1, 1}});
-  const FullSpaceModel model = build_full_space_model(bar.model);
+  const SparseModel model = build_sparse_model(bar.model);
   FullSpaceState state = at_rest(model);
   state.applied_force[3] = std::numeric_limits<double>::quiet_NaN();
-  FullSpaceWorkspace workspace(model);
+  SparseWorkspace workspace(model);
   EXPECT_TRUE(step(model, scene_of(Integrator::kBdf2, 0.01), state, workspace).status & runtime::kStepNonFinite);
   EXPECT_EQ(state.step, 0);
   EXPECT_TRUE(state.q.isZero());
@@ -210,9 +210,9 @@ TEST(FullSpace, ReportsWhatIsNotFiniteAndKeepsTheState) {
 
 TEST(FullSpace, NamesAMissingGroup) {
   test::Bar bar = test::make_bar({.cells = {2, 1, 1}});
-  EXPECT_THROW(build_full_space_model(bar.model, {.whole_body = true}), InputError);
+  EXPECT_THROW(build_sparse_model(bar.model, {.whole_body = true}), InputError);
   bar.model.object.reset();
-  EXPECT_THROW(build_full_space_model(bar.model), InputError);
+  EXPECT_THROW(build_sparse_model(bar.model), InputError);
 }
 
 // A free body in a frame of its own (the run time) and in the world: of second order in the time step they are the
@@ -221,7 +221,7 @@ TEST(FullSpace, FreeBodiesWithDampingAndExamplesAreThoseOfTheRunTime) {
   test::Bar bar =
       complete_bar({.cells = {2, 1, 1}, .density_gradient = 0.5, .free = true, .eigenfunctions = 3, .examples = 2});
   const auto reduced = runtime::build_model(bar.model, {}).model;
-  const FullSpaceModel full = build_full_space_model(bar.model, {.whole_body = true});
+  const SparseModel full = build_sparse_model(bar.model, {.whole_body = true});
   runtime::FrameMotion motion;
   motion.linear_velocity = Eigen::Vector3d(1, 0, -1);
   motion.angular_velocity = Eigen::Vector3d(1, 6, -3);
@@ -274,7 +274,7 @@ struct Dropped {
   explicit Dropped(double friction, double slope)
       : bar(test::make_bar({.cells = {2, 1, 1}, .lengths = {0.4, 0.2, 0.2}, .youngs_modulus = 1e6, .free = true})) {
     bar.model.contact = test::surface_contact(bar.model);
-    model = build_full_space_model(bar.model);
+    model = build_sparse_model(bar.model);
     scene.time_step = 2e-3;
     // The floor stays level; gravity leans.
     scene.gravity = kGravity * Eigen::Vector3d(std::sin(slope), 0, -std::cos(slope));
@@ -288,7 +288,7 @@ struct Dropped {
 
   static constexpr double kGravity = 9.81;
   test::Bar bar;
-  FullSpaceModel model;
+  SparseModel model;
   FullSpaceScene scene;
   FullSpaceState state;
 };
@@ -296,8 +296,8 @@ struct Dropped {
 TEST(FullSpaceContact, ABodyComesToRestAndTheFloorCarriesIt) {
   Dropped body(0.5, 0);
   run(body.model, body.scene, body.state, 1500);
-  FullSpaceWorkspace workspace(body.model);
-  const FullSpaceReport report = step(body.model, body.scene, body.state, workspace);
+  SparseWorkspace workspace(body.model);
+  const SparseReport report = step(body.model, body.scene, body.state, workspace);
   const double weight = body.mass() * Dropped::kGravity;
   EXPECT_NEAR(report.contact_force[2], weight, 1e-4 * weight);
   EXPECT_GT(report.contacts, 3);

@@ -44,7 +44,7 @@ class ReducedTwin {
     auto built = runtime::build_model(bar_.model, reduced_options);
     if (!built.model) throw InputError(built.complaint);
     reduced_ = std::move(built.model);
-    full_ = build_full_space_model(bar_.model, full_options);
+    full_ = build_sparse_model(bar_.model, full_options);
     reduced_scene_.integrator = full_scene_.integrator = options.integrator;
     reduced_scene_.time_step = full_scene_.time_step = 0.01;
     reduced_scene_.newton = full_scene_.newton = {60, 1e-11};
@@ -70,11 +70,11 @@ class ReducedTwin {
     runtime::prepare_contacts(*reduced_, reduced_scene_.obstacles.size(), state);
     FullSpaceState full_state = at_rest(full_);
     runtime::Workspace workspace(*reduced_, reduced_scene_);
-    FullSpaceWorkspace full_workspace(full_);
+    SparseWorkspace full_workspace(full_);
     double largest = 0, size = 0;
     for (int i = 0; i < steps; ++i) {
       EXPECT_EQ(runtime::step(*reduced_, reduced_scene_, state, workspace).status & ~runtime::kStepSubnormal, 0U) << i;
-      const FullSpaceReport report = step(full_, full_scene_, full_state, full_workspace);
+      const SparseReport report = step(full_, full_scene_, full_state, full_workspace);
       EXPECT_EQ(report.status, 0U) << i;
       contacts_ += report.contacts;
       const Eigen::VectorXd u = bar_.basis() * state.q;
@@ -144,7 +144,7 @@ class ReducedTwin {
 
   test::Bar bar_;
   std::unique_ptr<const runtime::Model> reduced_;
-  FullSpaceModel full_;
+  SparseModel full_;
   runtime::StepScene reduced_scene_;
   FullSpaceScene full_scene_;
   double size_ = 0, weights_off_ = 0;

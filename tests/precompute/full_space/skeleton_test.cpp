@@ -57,7 +57,7 @@ struct BoneBar {
     if (examples > 0) {
       const FilterFunctions functions(laplace_basis_of(data), data.object->mesh, data.object->materials.density);
       FullSpaceData full_data;
-      full_data.filter = functions.root_over_analysis() * functions.analysis;
+      full_data.filter = functions.root_over_analysis * functions.analysis;
       for (Eigen::Index v = 0; v < rest.rows(); ++v)
         if (data.object->fixed[v] != 0) full_data.filter.row(v).setZero();
       full_data.slopes.setZero(data.examples->gram.rows(), 3 * full_data.filter.cols());

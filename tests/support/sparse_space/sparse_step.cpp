@@ -1,4 +1,4 @@
-#include "precompute/full_space/full_space_step.h"
+#include "tests/support/sparse_space/sparse_step.h"
 
 #include <algorithm>
 #include <utility>
@@ -16,7 +16,7 @@ bool pushes(const VertexForceConfig& force, double time) { return force.start <=
 
 }  // namespace
 
-void FullSpaceStep::gather_external_force() {
+void SparseStep::gather_external_force() {
   const double midpoint = state_.time + 0.5 * scene_.time_step;
   Eigen::VectorXd forces = Eigen::VectorXd::Zero(3 * model_.rest.rows());
   for (const VertexForceConfig& force : scene_.forces)
@@ -26,14 +26,14 @@ void FullSpaceStep::gather_external_force() {
 }
 
 // The first step, one after contact, and one that a force begins or ends with have no smooth past.
-bool FullSpaceStep::begins_anew() const {
+bool SparseStep::begins_anew() const {
   const double midpoint = state_.time + 0.5 * scene_.time_step;
   return state_.begins_anew || std::ranges::any_of(scene_.forces, [&](const VertexForceConfig& force) {
            return pushes(force, midpoint) != pushes(force, midpoint - scene_.time_step);
          });
 }
 
-bool FullSpaceStep::find_contacts() {
+bool SparseStep::find_contacts() {
   if (!model_.contacts || scene_.obstacles.empty()) return false;
   const double dt = scene_.time_step;
   const auto capacity = scene_.obstacles.size() * static_cast<std::size_t>(model_.contacts->vertices());
@@ -45,7 +45,7 @@ bool FullSpaceStep::find_contacts() {
   return true;
 }
 
-void FullSpaceStep::set_form(Integrator integrator) {
+void SparseStep::set_form(Integrator integrator) {
   if (integrator == Integrator::kNewmark)
     runtime::newmark_form(history(), begins_anew() ? start_acceleration() : state_.a, scene_.time_step, terms_.form);
   else if (integrator == Integrator::kBdf2 && !begins_anew())
@@ -55,7 +55,7 @@ void FullSpaceStep::set_form(Integrator integrator) {
 }
 
 // u_v by the formulas of the velocity's centre, of the deformations at the beginning and one step before.
-void FullSpaceStep::set_rate_centre(Integrator integrator) {
+void SparseStep::set_rate_centre(Integrator integrator) {
   if (!model_.frame) {
     terms_.rate_centre = terms_.form.velocity_centre;
     return;
@@ -69,7 +69,7 @@ void FullSpaceStep::set_rate_centre(Integrator integrator) {
 }
 
 // Acceleration at the beginning of the step, by the equation of motion.
-Eigen::VectorXd FullSpaceStep::start_acceleration() {
+Eigen::VectorXd SparseStep::start_acceleration() {
   Eigen::VectorXd internal;
   LowerTriangle stiffness;
   model_.elasticity.force_and_stiffness(state_.q, runtime::Tangent::kExact, internal, stiffness);
@@ -98,11 +98,11 @@ Eigen::VectorXd FullSpaceStep::start_acceleration() {
   return workspace_.mass->solve(terms_.external_force - internal - start.force(deforming));
 }
 
-bool FullSpaceStep::acts(std::size_t group) const {
+bool SparseStep::acts(std::size_t group) const {
   return group < scene_.examples.size() && runtime::acts(scene_.examples[group]);
 }
 
-void FullSpaceStep::update_targets(const Eigen::VectorXd& q) {
+void SparseStep::update_targets(const Eigen::VectorXd& q) {
   const Timer timer;
   terms_.examples.clear();
   report_.inverted_tets = 0;
@@ -124,7 +124,7 @@ void FullSpaceStep::update_targets(const Eigen::VectorXd& q) {
 }
 
 // The elasticity of which the target [f] is the undeformed shape.
-const MeshElasticity* FullSpaceStep::undeformed(std::size_t group, const Eigen::VectorXd& target) {
+const MeshElasticity* SparseStep::undeformed(std::size_t group, const Eigen::VectorXd& target) {
   auto& elasticity = workspace_.examples[group].elasticity;
   if (!elasticity) {
     elasticity = model_.elasticity;
@@ -137,7 +137,7 @@ const MeshElasticity* FullSpaceStep::undeformed(std::size_t group, const Eigen::
 }
 
 // The step to the predictor q_n + dt v_n or none, whichever has the lower potential.
-void FullSpaceStep::choose_first_iterate() {
+void SparseStep::choose_first_iterate() {
   d_ = scene_.time_step * state_.v;
   if (potential_->start(d_) <= potential_->potential_at_start() || d_.isZero(0)) return;
   ++report_.line_search_evaluations;
@@ -145,13 +145,13 @@ void FullSpaceStep::choose_first_iterate() {
   potential_->start(d_);
 }
 
-void FullSpaceStep::refresh_friction(runtime::FrictionChange& change) {
+void SparseStep::refresh_friction(runtime::FrictionChange& change) {
   if (terms_.contacts == nullptr) return;
   for (runtime::ContactCandidate& candidate : contacts_.candidates)
     change.refresh(contacts_.obstacles[static_cast<std::size_t>(candidate.obstacle)].obstacle->friction, candidate);
 }
 
-void FullSpaceStep::add(const NewtonReport& newton) {
+void SparseStep::add(const NewtonReport& newton) {
   report_.newton_iterations += newton.iterations;
   report_.line_search_evaluations += newton.line_search_evaluations;
   report_.factorisations += newton.factorisations;
@@ -159,7 +159,7 @@ void FullSpaceStep::add(const NewtonReport& newton) {
   report_.residual = newton.residual;
 }
 
-void FullSpaceStep::commit() {
+void SparseStep::commit() {
   const runtime::StepForm& form = terms_.form;
   state_.q_previous = state_.q;
   state_.v_previous = state_.v;
@@ -180,7 +180,7 @@ void FullSpaceStep::commit() {
   state_.examples = std::move(examples_);
 }
 
-bool FullSpaceStep::begin() {
+bool SparseStep::begin() {
   gather_external_force();
   const Integrator integrator = find_contacts() ? Integrator::kBackwardEuler : scene_.integrator;
   set_form(integrator);
@@ -194,7 +194,7 @@ bool FullSpaceStep::begin() {
   return true;
 }
 
-const FullSpaceReport& FullSpaceStep::finish(NewtonStatus status) {
+const SparseReport& SparseStep::finish(NewtonStatus status) {
   if (status == NewtonStatus::kNonFinite || !d_.allFinite()) report_.status |= runtime::kStepNonFinite;
   if (status == NewtonStatus::kIterationLimit) report_.status |= runtime::kStepIterationLimit;
   if (status == NewtonStatus::kStagnated) report_.status |= runtime::kStepStagnated;

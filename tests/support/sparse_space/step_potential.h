@@ -4,9 +4,9 @@
 #include <optional>
 #include <vector>
 
-#include "precompute/full_space/full_space_stepper.h"
 #include "runtime/sim/solver/newton.h"
 #include "runtime/sim/step/integrator.h"
+#include "tests/support/sparse_space/sparse_model.h"
 
 namespace exmat::precompute {
 
@@ -14,7 +14,7 @@ namespace exmat::precompute {
 /// a clamped body, those in the FittedFrame of a free one.
 class Deformation {
  public:
-  Deformation(const FullSpaceModel& model, const Eigen::VectorXd& q);
+  Deformation(const SparseModel& model, const Eigen::VectorXd& q);
 
   const Eigen::VectorXd& u() const { return u_; }
   Eigen::VectorXd rate(const Eigen::VectorXd& x) const { return frame_ ? frame_->rate(*placement_, x) : x; }
@@ -53,11 +53,11 @@ struct StepTerms {
 ///   c_a/2 (q - q_a)^T M (q - q_a) + E(q) - f_ext . d + W_c(q) + c_v/2 (u - u_v)^T D (u - u_v)
 ///     + sum k/2 (u - u_c)^T P (u - u_c) - kappa (P u*) . u,
 /// the terms of runtime::IncrementalPotential in full space, summed over the example forces; an elastic one
-/// has e E*(q - u*) and of the filter the damping alone, k = c_kappa c_v. The skew part of P has no potential: in
-/// values its force is that of the iterate last accepted. Hessians leave out how the frame of a free body turns.
+/// has e E*(q - u*) and of the filter the damping alone, k = c_kappa c_v. Hessians leave
+/// out how the frame of a free body turns.
 class StepPotential {
  public:
-  StepPotential(const FullSpaceModel& model, const FullSpaceScene& scene, const FullSpaceState& state,
+  StepPotential(const SparseModel& model, const FullSpaceScene& scene, const FullSpaceState& state,
                 const StepTerms& terms);
 
   /// Elasticity at the first iterate. Returns inertia, elasticity and external force alone, comparable with
@@ -73,7 +73,7 @@ class StepPotential {
   runtime::PotentialEvaluation evaluate(const Eigen::VectorXd& d, Eigen::VectorXd& gradient);
   runtime::PotentialValue value(const Eigen::VectorXd& d) const;
   /// The d of the last evaluate() is the next iterate.
-  void accept(runtime::PotentialEvaluation& evaluation);
+  void accept() { at_first_iterate_ = false; }
 
   /// The sparse part of the Hessian at the d of the last evaluate(), and the product with all of it. With projected
   /// tangents at the first iterate, damping is frozen anew: evaluate again.
@@ -88,19 +88,17 @@ class StepPotential {
  private:
   bool deforms() const { return damped_ || filters(); }
   bool filters() const;
-  bool skew() const;
   double filter_stiffness(const ExampleTerm& term) const;
   double elastic_example_energy(const Eigen::VectorXd& q) const;
   double elastic_example_force(const Eigen::VectorXd& q);
   Eigen::VectorXd damping_product(const Eigen::VectorXd& u) const;
   Eigen::VectorXd filtered(const Eigen::VectorXd& u) const;
-  Eigen::VectorXd skew_filtered(const Eigen::VectorXd& u) const;
   Eigen::VectorXd deformation_product(const Eigen::VectorXd& u) const;
   double inertia_and_load(const Eigen::VectorXd& d) const;
   runtime::PotentialValue sum(double elastic, double contact, const Eigen::VectorXd& d,
                               const Eigen::VectorXd& offset_product, const Eigen::VectorXd& change) const;
 
-  const FullSpaceModel& model_;
+  const SparseModel& model_;
   const FullSpaceScene& scene_;
   const FullSpaceState& state_;
   const StepTerms& terms_;
@@ -115,7 +113,6 @@ class StepPotential {
   std::optional<Deformation> first_, here_;      // at the first iterate, at the last evaluate()
   Eigen::VectorXd start_deformation_;            // u_n
   Eigen::VectorXd linear_, deformation_linear_;  // gradients at q_n: of inertia and load by q, of the rest by u
-  Eigen::VectorXd frozen_, next_frozen_;         // force of the skew part of P
 };
 
 }  // namespace exmat::precompute

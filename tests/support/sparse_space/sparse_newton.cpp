@@ -1,4 +1,4 @@
-#include "precompute/full_space/sparse_newton.h"
+#include "tests/support/sparse_space/sparse_newton.h"
 
 #include <limits>
 
@@ -48,7 +48,7 @@ bool Minimisation::find_direction() {
   ++report_.projections;
   potential_.assemble(d_, Tangent::kPositiveSemidefinite);
   here_ = potential_.evaluate(d_, gradient_);
-  potential_.accept(here_);
+  potential_.accept();
   report_.residual = gradient_.norm();
   return solver_.solve_shifted(potential_.hessian(), product, -gradient_, direction_);
 }
@@ -73,7 +73,7 @@ bool Minimisation::move() {
     here_ = potential_.evaluate(d_, gradient_);
     return false;
   }
-  potential_.accept(there);
+  potential_.accept();
   d_.swap(trial);
   gradient_.swap(trial_gradient);
   here_ = there;

@@ -3,7 +3,7 @@
 #include <Eigen/Core>
 
 #include "precompute/full_space/sparse_direction.h"
-#include "precompute/full_space/step_potential.h"
+#include "tests/support/sparse_space/step_potential.h"
 
 namespace exmat::precompute {
 

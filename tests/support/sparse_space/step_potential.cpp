@@ -1,4 +1,4 @@
-#include "precompute/full_space/step_potential.h"
+#include "tests/support/sparse_space/step_potential.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,14 +8,14 @@ namespace exmat::precompute {
 using runtime::PotentialEvaluation;
 using runtime::PotentialValue;
 
-Deformation::Deformation(const FullSpaceModel& model, const Eigen::VectorXd& q)
+Deformation::Deformation(const SparseModel& model, const Eigen::VectorXd& q)
     : frame_(model.frame ? &*model.frame : nullptr), u_(q) {
   if (frame_ == nullptr) return;
   placement_ = frame_->place(q);
   u_ = frame_->deformation(*placement_);
 }
 
-StepPotential::StepPotential(const FullSpaceModel& model, const FullSpaceScene& scene, const FullSpaceState& state,
+StepPotential::StepPotential(const SparseModel& model, const FullSpaceScene& scene, const FullSpaceState& state,
                              const StepTerms& terms)
     : model_(model),
       scene_(scene),
@@ -25,12 +25,6 @@ StepPotential::StepPotential(const FullSpaceModel& model, const FullSpaceScene& 
       reach_(model.rest.cwiseAbs().maxCoeff() + state.q.lpNorm<Eigen::Infinity>()) {}
 
 bool StepPotential::filters() const { return std::ranges::any_of(scene_.examples, runtime::is_filtered); }
-
-bool StepPotential::skew() const {
-  return std::ranges::any_of(terms_.examples, [](const ExampleTerm& term) {
-    return runtime::is_filtered(*term.settings) && !term.examples->symmetric();
-  });
-}
 
 // k = kappa + c_kappa c_v; kappa is 0 of an elastic force.
 double StepPotential::filter_stiffness(const ExampleTerm& term) const {
@@ -58,8 +52,6 @@ void StepPotential::prepare() {
   const auto& form = terms_.form;
   linear_ =
       form.acceleration_factor * (model_.system.mass * (state_.q - form.acceleration_centre)) - terms_.external_force;
-  frozen_.setZero(state_.q.size());
-  next_frozen_ = frozen_;
   if (!deforms()) return;
   start_deformation_ = Deformation(model_, state_.q).u();
   deformation_linear_.setZero(state_.q.size());
@@ -89,15 +81,6 @@ Eigen::VectorXd StepPotential::filtered(const Eigen::VectorXd& u) const {
   return sum;
 }
 
-// sum k (P - P^T)/2 u.
-Eigen::VectorXd StepPotential::skew_filtered(const Eigen::VectorXd& u) const {
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(u.size());
-  for (const ExampleTerm& term : terms_.examples)
-    if (runtime::is_filtered(*term.settings))
-      sum += 0.5 * filter_stiffness(term) * (term.examples->filter(u) - term.examples->transposed_filter(u));
-  return sum;
-}
-
 // c_v D u + sum k P u.
 Eigen::VectorXd StepPotential::deformation_product(const Eigen::VectorXd& u) const {
   Eigen::VectorXd product = Eigen::VectorXd::Zero(u.size());
@@ -115,10 +98,11 @@ PotentialValue StepPotential::sum(double elastic, double contact, const Eigen::V
   if (terms_.contacts != nullptr) total.magnitude += reach_ * terms_.contacts->force.lpNorm<1>();
   total.magnitude += reach_ * example_force_.lpNorm<1>();
   if (!deforms()) return total;
-  const Eigen::VectorXd product = deformation_product(change), linear = deformation_linear_ + frozen_;
-  total.value += 0.5 * change.dot(product) + linear.dot(change);
+  const Eigen::VectorXd product = deformation_product(change);
+  total.value += 0.5 * change.dot(product) + deformation_linear_.dot(change);
   const double reach = model_.frame ? reach_ : 0;
-  total.magnitude += (0.5 * product.cwiseAbs() + linear.cwiseAbs()).dot((change.array().abs() + reach).matrix());
+  total.magnitude +=
+      (0.5 * product.cwiseAbs() + deformation_linear_.cwiseAbs()).dot((change.array().abs() + reach).matrix());
   return total;
 }
 
@@ -167,7 +151,6 @@ PotentialEvaluation StepPotential::evaluate_first(const Eigen::VectorXd& d, Eige
     here_.emplace(model_, q);
     change = here_->u() - start_deformation_;
     gradient += here_->force(deformation_linear_ + deformation_product(change));
-    if (skew()) next_frozen_ = skew_filtered(change);
   }
   const double example_energy = elastic_example_force(q);
   if (example_force_.size() > 0) gradient += example_force_;
@@ -182,14 +165,6 @@ PotentialEvaluation StepPotential::evaluate_first(const Eigen::VectorXd& d, Eige
   }
   evaluation.potential = sum(elastic_energy_ + example_energy, contact, d, inertia, change);
   return evaluation;
-}
-
-void StepPotential::accept(PotentialEvaluation& evaluation) {
-  at_first_iterate_ = false;
-  if (!skew()) return;
-  const Eigen::VectorXd change = here_->u() - start_deformation_;
-  evaluation.potential.value += (next_frozen_ - frozen_).dot(change);
-  frozen_ = next_frozen_;
 }
 
 void StepPotential::assemble(const Eigen::VectorXd& d, runtime::Tangent tangent) {
@@ -219,10 +194,7 @@ Eigen::VectorXd StepPotential::product(const Eigen::VectorXd& x) const {
 
 Eigen::VectorXd StepPotential::filter_product(const Eigen::VectorXd& x) const {
   if (!filters()) return {};
-  const Eigen::VectorXd change = here_->rate(x);
-  Eigen::VectorXd force = filtered(change);
-  if (skew()) force -= skew_filtered(change);
-  return here_->force(force);
+  return here_->force(filtered(here_->rate(x)));
 }
 
 }  // namespace exmat::precompute

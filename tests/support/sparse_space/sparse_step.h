@@ -4,20 +4,18 @@
 #include <optional>
 #include <vector>
 
-#include "precompute/full_space/full_space_stepper.h"
-#include "precompute/full_space/step_potential.h"
+#include "tests/support/sparse_space/step_potential.h"
 
 namespace exmat::precompute {
 
 /// One step of a body from its beginning to its end: begin(), then whoever minimises the potential in d(), then
 /// finish().
-class FullSpaceStep {
+class SparseStep {
  public:
-  FullSpaceStep(const FullSpaceModel& model, const FullSpaceScene& scene, FullSpaceState& state,
-                FullSpaceWorkspace& workspace)
+  SparseStep(const SparseModel& model, const FullSpaceScene& scene, FullSpaceState& state, SparseWorkspace& workspace)
       : model_(model), scene_(scene), state_(state), workspace_(workspace) {}
-  FullSpaceStep(const FullSpaceStep&) = delete;
-  FullSpaceStep& operator=(const FullSpaceStep&) = delete;
+  SparseStep(const SparseStep&) = delete;
+  SparseStep& operator=(const SparseStep&) = delete;
 
   /// True if the potential can be minimised: all numbers are finite. Near obstacles it is that of backward Euler.
   bool begin();
@@ -31,7 +29,7 @@ class FullSpaceStep {
 
   void add(const runtime::NewtonReport& newton);
   /// The state of the end, unless a number is not finite.
-  const FullSpaceReport& finish(runtime::NewtonStatus status);
+  const SparseReport& finish(runtime::NewtonStatus status);
 
  private:
   void gather_external_force();
@@ -47,11 +45,11 @@ class FullSpaceStep {
   void choose_first_iterate();
   void commit();
 
-  const FullSpaceModel& model_;
+  const SparseModel& model_;
   const FullSpaceScene& scene_;
   FullSpaceState& state_;
-  FullSpaceWorkspace& workspace_;
-  FullSpaceReport report_;
+  SparseWorkspace& workspace_;
+  SparseReport report_;
   StepTerms terms_;
   VertexContacts::Step contacts_;
   std::vector<runtime::ExampleState> examples_;  // at the end of the step, of those that act

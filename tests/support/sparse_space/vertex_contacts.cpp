@@ -1,4 +1,4 @@
-#include "precompute/full_space/vertex_contacts.h"
+#include "tests/support/sparse_space/vertex_contacts.h"
 
 #include <algorithm>
 
