@@ -274,7 +274,7 @@ exmat_status exmat_body_read_energies(const exmat_body* body, exmat_energies* re
   EXMAT_REQUIRE(body);
   if (result == nullptr) return null_argument(__func__, "energies");
   if (const exmat_status status = check_size(__func__, result->size, kEnergiesSizes)) return status;
-  const Energies now = energies(body->full(), body->model(), body->scene, body->state);
+  const Energies now = body->world->world.energies(place_of(*body));
   give(exmat_energies{0, now.kinetic, now.elastic, now.potential, now.contact}, result->size, result);
   return EXMAT_OK;
 }

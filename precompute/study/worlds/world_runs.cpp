@@ -101,7 +101,7 @@ WorldRun run_world(const WorldConfig& config, const std::vector<double>& times) 
     WorldFrame now = world_frame(kind.data, *kind.model->frame, world.state(body), kind.full.get());
     frames.positions.push_back(std::move(now.positions));
     frames.velocities.push_back(std::move(now.velocities));
-    add_energies(runtime::energies(kind.full.get(), *kind.model, kind.scene, world.state(body)), frames);
+    add_energies(world.energies(body), frames);
   };
   run(config.time_step, times, take, record, result);
   return result;

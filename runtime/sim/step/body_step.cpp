@@ -14,6 +14,8 @@
 namespace exmat::runtime {
 namespace {
 
+constexpr double kGain = 1e-12;  // of energies: rounding
+
 constexpr double kResolvedTurn = 0.3;  // [rad] of a free body in one step
 
 FrameStep frame_step(const StepScene& scene, const State& state) {
@@ -204,12 +206,20 @@ NewtonReport BodyStep::solve() noexcept {
 }
 
 StepReport BodyStep::finish(const NewtonReport& newton) noexcept {
-  const bool unbalanced = near_ && !held_ && newton.status != NewtonStatus::kConverged;
-  const Energies before = unbalanced ? energies(model_, scene_, state_) : Energies{};
+  const bool converged = newton.status == NewtonStatus::kConverged;
+  const bool unbalanced = near_ && !held_ && !converged;
+  const bool closed = near_ && !held_ && !model_.frame->is_driven() && workspace_.near->contact.loaded_count > 0 &&
+                      state_.contacts.longest_way_out() == 0 && is_isolated(scene_, state_, workspace_.near->contact);
+  Start start;
+  if (unbalanced || closed) start.energies = energies(model_, scene_, state_);
+  if (closed) start.motion = model_.frame->motion(state_.frame);
+  if (closed) start.springs = workspace_.near->contact.start_energy();
   take(newton);
-  if (unbalanced && (report_.status & kStepNonFinite) == 0) {
+  if (closed && (report_.status & kStepNonFinite) == 0) {
+    limit_energy(start, converged);
+  } else if (unbalanced && (report_.status & kStepNonFinite) == 0) {
     const Energies now = energies(model_, scene_, state_);
-    limit_kinetic_energy(before.total() - now.elastic - now.potential);
+    limit_kinetic_energy(start.energies.total() - now.elastic - now.potential);
   }
   if (rests(model_, scene_, report_, state_)) put_to_sleep(model_, state_, workspace_);
   return report_;
@@ -235,6 +245,29 @@ const StepReport& BodyStep::take(const NewtonReport& newton) noexcept {
   if (held_ && end_attachments(pose_of(model_, state_), workspace.near->held, state_.attachments))
     state_.begins_anew = true;
   return report_;
+}
+
+// Springs of vertices that the step has brought deep, as through an edge, were paid for by nobody.
+void BodyStep::limit_energy(const Start& start, bool converged) noexcept {
+  const ContactWorkspace& contact = workspace_.near->contact;
+  const double springs = contact.end_energy(model_.frame->placement(state_.frame).position);
+  const Energies now = energies(model_, scene_, state_);
+  const double allowed = start.energies.total() + start.springs, held = now.elastic + now.potential + springs;
+  const double rounding = kGain * (std::abs(allowed) + start.energies.kinetic + start.springs + springs);
+  if (held > allowed + rounding) {
+    report_.status |= kStepStagnated;
+    state_.q = state_.q_previous;
+    state_.v.setZero();
+    state_.elastic_energy = start.energies.elastic;
+    FrameMotion motion = start.motion;
+    motion.linear_velocity.setZero();
+    motion.angular_velocity.setZero();
+    model_.frame->set_motion(motion, state_.q, state_.v, workspace_.frame, state_.frame);
+    return;
+  }
+  if (converged && now.kinetic + held <= allowed + rounding) return;
+  limit_kinetic_energy(converged ? allowed - held
+                                 : std::min(allowed - springs, start.energies.total()) - now.elastic - now.potential);
 }
 
 void BodyStep::limit_kinetic_energy(double allowed) noexcept {

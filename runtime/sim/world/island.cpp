@@ -619,16 +619,9 @@ IslandStart start_accounts(std::span<WorldBody* const> bodies, std::span<PairCon
 /// True if nothing but gravity, what they do to each other and obstacles that stand still change the energy of the
 /// bodies.
 bool is_isolated(std::span<WorldBody* const> bodies) noexcept {
-  return std::ranges::none_of(bodies, [](const WorldBody* own) {
-    if (own->full ? own->full->is_driven() : own->model.frame->is_driven()) return true;
-    const ContactWorkspace& contact = own->near().contact;
-    const bool is_pushed =
-        contact.candidate_count > 0 &&
-        std::ranges::any_of(contact.obstacles, [](const auto& placed) { return placed.obstacle->motion.moves(); });
-    const auto* const free = std::get_if<FreeState>(&own->state.frame);
-    return is_pushed || holds_modes(own->state.attachments) || runs_examples(own->scene()) ||
-           !own->scene().forces.empty() || !own->state.applied_force.isZero(0) || !own->state.vertex_force.isZero(0) ||
-           (free != nullptr && !(free->applied_force.isZero(0) && free->applied_torque.isZero(0)));
+  return std::ranges::all_of(bodies, [](const WorldBody* own) {
+    const bool driven = own->full ? own->full->is_driven() : own->model.frame->is_driven();
+    return !driven && is_isolated(own->scene(), own->state, own->near().contact);
   });
 }
 

@@ -673,13 +673,13 @@ void World::remember() {
 
 Energies World::energies(int body) const noexcept {
   const BodyKind& kind = at(body).kind;
-  return runtime::energies(kind.full, *kind.model, *kind.scene, state(body));
+  return runtime::energies(kind.full, *kind.model, *kind.scene, state(body), at(body).full.get());
 }
 
 Energies World::energies() const {
   Energies sum;
-  for (const Member& body : bodies_) {
-    const Energies own = runtime::energies(body.kind.full, *body.kind.model, *body.kind.scene, *body.state);
+  for (int i = 0; i < count(); ++i) {
+    const Energies own = energies(i);
     sum.kinetic += own.kinetic;
     sum.elastic += own.elastic;
     sum.potential += own.potential;

@@ -382,9 +382,13 @@ Eigen::Vector3d full_velocity(const FullModel& full, const Placement& frame, con
   return velocity.at(frame.rotation * rest);
 }
 
-Energies energies(const FullModel* full, const Model& model, const StepScene& scene, const State& state) noexcept {
+Energies energies(const FullModel* full, const Model& model, const StepScene& scene, const State& state,
+                  FullWorkspace* own) noexcept {
   if (!state.full) return energies(model, scene, state);
-  return energies_of(*full, scene, *state.full, state.full->skeleton ? &*state.full->skeleton : nullptr);
+  const SkeletonMotion* const bones = state.full->skeleton ? &*state.full->skeleton : nullptr;
+  Energies now = energies_of(*full, scene, *state.full, bones);
+  if (own != nullptr && !state.full->begins_anew) now.elastic = elastic_energy(*full, scene, *state.full, *own, bones);
+  return now;
 }
 
 }  // namespace exmat::runtime

@@ -96,7 +96,9 @@ Eigen::Vector3d full_displacement(const FullModel& full, const Placement& frame,
 Eigen::Vector3d full_velocity(const FullModel& full, const Placement& frame, const FrameVelocity& velocity,
                               const FullMotion& motion, Eigen::Index vertex) noexcept;
 
-/// runtime::energies() of a body in the space that it is in.
-Energies energies(const FullModel* full, const Model& model, const StepScene& scene, const State& state) noexcept;
+/// runtime::energies() of a body in the space that it is in. With `own` the elastic energy of one in full space is that
+/// where it stands, also where its last step was not evaluated at its end; the state stays as it is.
+Energies energies(const FullModel* full, const Model& model, const StepScene& scene, const State& state,
+                  FullWorkspace* own = nullptr) noexcept;
 
 }  // namespace exmat::runtime

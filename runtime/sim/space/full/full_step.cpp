@@ -15,6 +15,7 @@ constexpr int kContactIterations = 60;  // of conjugate gradients near obstacles
 constexpr double kLongStep = 0.008;     // [s]
 constexpr double kDelicate = 0.1;       // of the accuracy, in long steps and without damping of stiffness
 constexpr FullAccuracy kResponse{1e-5, 300, 0};
+constexpr double kGain = 1e-6;    // of energies, to which steps are solved
 constexpr double kForcing = 0.3;  // of what is left to the tolerance, that a direction is solved to
 
 FullWorkspace::Key key_of(const StepScene& scene) {
@@ -319,7 +320,14 @@ void FullStep::choose_first_iterate() noexcept {
   d *= scene_.time_step;
   predicted_ = is_checked() || (!anew_ && largest_move(d) <= kMostPredicted * space_.edge());
   stay(at_rest);
-  const double at_start = is_checked() ? potential_.undamped_at(at_rest, state_.elastic_energy) : 0;
+  double at_start = 0;
+  if (is_checked() && comes_unchecked()) {
+    potential_.evaluate_elements(at_rest, FullPotential::Tangents::kNone, true);
+    at_start = potential_.undamped();
+    state_.elastic_energy = potential_.elastic_energy();
+  } else if (is_checked()) {
+    at_start = potential_.undamped_at(at_rest, state_.elastic_energy);
+  }
   if (predicted_)
     carry(d);
   else
@@ -530,6 +538,11 @@ double FullStep::direction_tolerance() const noexcept {
   return delicate ? kDelicate * workspace_.accuracy.tolerance : workspace_.accuracy.tolerance;
 }
 
+// True if the elastic energy may not be that of the end of the last step.
+bool FullStep::comes_unchecked() const noexcept {
+  return !state_.begins_anew && !is_attached() && workspace_.accuracy.unchecked_move > 0 && !is_stiff();
+}
+
 bool FullStep::is_short() const noexcept {
   return !is_checked() && predicted_ && at_first_iterate_ &&
          largest_move(workspace_.direction) <= workspace_.accuracy.unchecked_move * space_.edge();
@@ -703,6 +716,36 @@ void FullStep::limit_energy(double allowed) noexcept {
   space_.to_field(state_.v, workspace_.field);
 }
 
+// True if nothing but gravity and obstacles that stand still, which it touches, changes the energy of the body.
+bool FullStep::is_closed() const noexcept {
+  const auto moves = [](const PlacedObstacle& placed) { return placed.obstacle->motion.moves(); };
+  return near_ && !among_others_ && memory_.found->loaded_count > 0 && memory_.held->longest_way_out() == 0 &&
+         !model_.is_driven() && !is_attached() && std::ranges::none_of(scene_.examples, acts) &&
+         scene_.forces.empty() && state_.applied_force.isZero(0) &&
+         std::ranges::none_of(memory_.found->obstacles, moves);
+}
+
+// Springs of vertices that the step has brought deep, as through an edge, were paid for by nobody: a body that would
+// have more energy than `allowed` without moving stays where the step began, at rest.
+void FullStep::keep_energy(double allowed, double elastic_before) noexcept {
+  const Energies now = energies_of(model_, scene_, state_, memory_.bones);
+  const double springs = memory_.found->end_energy(Eigen::Vector3d::Zero());
+  const double held = now.elastic + now.potential + springs;
+  const double rounding = kGain * (std::abs(allowed) + now.kinetic + std::abs(held));
+  if (now.kinetic + held <= allowed + rounding) return;
+  if (held > allowed + rounding) {
+    report_.status |= kStepStagnated;
+    state_.q = state_.q_previous;
+    state_.elastic_energy = elastic_before;
+    state_.v.setZero();
+  } else {
+    state_.v *= std::sqrt(std::max(0.0, allowed - held) / now.kinetic);
+  }
+  space_.to_field(state_.q, workspace_.trial);
+  space_.to_field(state_.v, workspace_.field);
+  if (model_.rigid) model_.rigid->place(workspace_.trial.data(), workspace_.potential.rigid);
+}
+
 void FullStep::end_attachments() noexcept {
   for (Attachment& attachment : memory_.attachments) {
     attachment.rotation_before = attachment.rotation;
@@ -736,8 +779,12 @@ const FullReport& FullStep::finish(const FrameMomenta& others) noexcept {
     return report_;
   }
   const bool unbalanced = (near_ || among_others_) && status_ != NewtonStatus::kConverged;
-  const double elastic = potential_.elastic_energy();
-  if (unbalanced && !among_others_) energy = energies(model_, scene_, state_, workspace_, memory_.bones).total();
+  const bool closed = is_closed();
+  const double elastic = potential_.elastic_energy(), elastic_before = state_.elastic_energy;
+  if (closed)
+    energy = energies_of(model_, scene_, state_, memory_.bones).total() + memory_.found->start_energy();
+  else if (unbalanced && !among_others_)
+    energy = energies(model_, scene_, state_, workspace_, memory_.bones).total();
   state_.q_previous = state_.q;
   state_.v_previous = state_.v;
   state_.v = workspace_.rate;
@@ -756,10 +803,11 @@ const FullReport& FullStep::finish(const FrameMomenta& others) noexcept {
   if (model_.rigid) model_.rigid->place(workspace_.trial.data(), workspace_.potential.rigid);
   // Momenta and energy of a body that something holds are its host's, too.
   if (!is_attached()) {
-    if (unbalanced && !among_others_ && !model_.is_driven())
+    if (unbalanced && !among_others_ && !model_.is_driven() && !closed)
       limit_energy(energy);
     else if (model_.rigid && !unbalanced)
       correct_momenta(others);
+    if (closed) keep_energy(energy, elastic_before);
   }
   end_attachments();
   if (model_.skin) end_bones();
@@ -878,8 +926,8 @@ Energies energies_of(const FullModel& model, const StepScene& scene, const Motio
   return {model.space.kinetic_energy(state.v, driven), state.elastic_energy, fixed - weight.dot(scene.gravity)};
 }
 
-Energies energies(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace,
-                  const SkeletonMotion* bones) noexcept {
+double elastic_energy(const FullModel& model, const StepScene& scene, const Motion& state, FullWorkspace& workspace,
+                      const SkeletonMotion* bones) noexcept {
   StepForm& form = workspace.form;
   form.velocity_factor = form.acceleration_factor = 0;
   form.velocity_centre = form.acceleration_centre = state.q;
@@ -891,7 +939,12 @@ Energies energies(const FullModel& model, const StepScene& scene, Motion& state,
   if (model.skin) SkinnedPart::place_fixed(bones->q, workspace.potential.start);
   workspace.d.setZero();
   potential.evaluate_elements(workspace.d, FullPotential::Tangents::kNone, false);
-  state.elastic_energy = potential.elastic_energy();
+  return potential.elastic_energy();
+}
+
+Energies energies(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace,
+                  const SkeletonMotion* bones) noexcept {
+  state.elastic_energy = elastic_energy(model, scene, state, workspace, bones);
   return energies_of(model, scene, state, bones);
 }
 

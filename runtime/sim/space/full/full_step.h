@@ -205,9 +205,10 @@ class FullStep {
   /// Near obstacles or bodies, where a host holds it or the caller asks for it, and where waves go so far in a step
   /// that the predictor leads away from the solution: what an unchecked direction leaves then would grow.
   bool is_checked() const noexcept {
-    return near_ || among_others_ || is_attached() || workspace_.accuracy.unchecked_move == 0 ||
-           space_.wave_rate() * scene_.time_step > kStiffStep;
+    return near_ || among_others_ || is_attached() || workspace_.accuracy.unchecked_move == 0 || is_stiff();
   }
+  bool is_stiff() const noexcept { return space_.wave_rate() * scene_.time_step > kStiffStep; }
+  bool comes_unchecked() const noexcept;
   double direction_tolerance() const noexcept;
   bool is_short() const noexcept;
   double largest_move(const Eigen::VectorXd& field) const noexcept;
@@ -218,6 +219,8 @@ class FullStep {
   bool is_free() const noexcept { return model_.rigid && !is_attached(); }
   void move_centre(const Eigen::Vector3d& velocity) noexcept;
   void limit_energy(double allowed) noexcept;
+  bool is_closed() const noexcept;
+  void keep_energy(double allowed, double elastic_before) noexcept;
 
   const FullModel& model_;
   const FullSpace& space_;
@@ -248,7 +251,10 @@ State make_state(const FullModel& model, const Eigen::VectorXd& u, const Eigen::
 /// Energies of a state, as runtime::energies(); of a body on a skeleton with its bones.
 Energies energies_of(const FullModel& model, const StepScene& scene, const Motion& state,
                      const SkeletonMotion* bones = nullptr) noexcept;
-/// The same, its elastic energy evaluated and set.
+/// Elastic energy where it stands [J].
+double elastic_energy(const FullModel& model, const StepScene& scene, const Motion& state, FullWorkspace& workspace,
+                      const SkeletonMotion* bones = nullptr) noexcept;
+/// Energies with that, which is set.
 Energies energies(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace,
                   const SkeletonMotion* bones = nullptr) noexcept;
 
