@@ -224,13 +224,14 @@ struct MeshInertia {
 /// Inertia 1/2 c_a a M a, damping 1/2 c_v w D w, elastic energy, that of an elastic example force [J].
 inline constexpr std::ptrdiff_t kMeshSums = 4;
 
-inline constexpr std::ptrdiff_t kFactorMultiple = 4;
-/// L L^T of a scalar matrix [n x n], L below its diagonal by rows and by columns, each padded with zeros to a multiple
-/// of kFactorMultiple.
+inline constexpr std::ptrdiff_t kFactorBlock = 4;
+/// L L^T of a scalar matrix in blocks of kFactorBlock rows and columns, each by rows; what pads the last one is zero.
 struct MeshFactor {
-  std::ptrdiff_t size = 0;
-  const int *row_starts = nullptr, *columns = nullptr, *column_starts = nullptr, *rows = nullptr;
-  const float *by_row = nullptr, *by_column = nullptr, *inverse_diagonal = nullptr;
+  std::ptrdiff_t blocks = 0;        ///< along the diagonal
+  const int* starts = nullptr;      ///< blocks + 1, into `rows`
+  const int* rows = nullptr;        ///< of the blocks below each one on the diagonal that are not zero
+  const float* values = nullptr;    ///< those blocks
+  const float* diagonal = nullptr;  ///< inverse of each block on the diagonal, and its transpose
 };
 
 /// m scalar functions of the vertices: n x stride, rows padded with zeros to kMeshLanes. Coefficients: 3 x stride.
@@ -422,8 +423,10 @@ struct Kernels {
                                   bool freeze, double* frozen, float* tangents, double* force, double* sums);
   /// product = matrix x + sum over the elements of B^T T B x; the matrix on the pattern of the mass.
   void (*mesh_product)(const MeshArrays&, const float* matrix, const float* tangents, const float* x, float* product);
-  /// x = (L L^T)^-1 right.
-  void (*mesh_solve)(const MeshFactor&, const float* right, float* x);
+  /// x = L^-1 right; returns x . x. Fields of as many vertices as the blocks have rows.
+  float (*mesh_solve_lower)(const MeshFactor&, const float* right, float* x);
+  /// x <- L^-T x.
+  void (*mesh_solve_upper)(const MeshFactor&, float* x);
   /// coefficients = functions^T field; field += factor functions coefficients.
   void (*mesh_coefficients)(const MeshFilter<double>&, const double* field, double* coefficients);
   void (*mesh_rounded_coefficients)(const MeshFilter<float>&, const float* field, float* coefficients);

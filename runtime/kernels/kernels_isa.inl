@@ -5,6 +5,7 @@
 #include <immintrin.h>
 #endif
 
+#include <cstring>
 #include <type_traits>
 #include <utility>
 
@@ -485,7 +486,8 @@ const Kernels EXMAT_SIMD_KERNELS{EXMAT_SIMD_NAME,
                                  mesh_force,
                                  mesh_force_and_tangents,
                                  mesh_product,
-                                 mesh_solve,
+                                 mesh_solve_lower,
+                                 mesh_solve_upper,
                                  mesh_coefficients,
                                  mesh_rounded_coefficients,
                                  mesh_add_functions,

@@ -14,6 +14,73 @@ inline void store_quad(float* p, FloatQuad v) { *reinterpret_cast<StoredFloatQua
 template <class Number>
 using QuadOf = decltype(load_quad(static_cast<const Number*>(nullptr)));
 
+/// A group: as many vertices as a register holds, at least one.
+using FloatGroup = FloatVec;
+using DoubleGroup = std::conditional_t<(kWidth < 4), Quad, Vec>;
+inline FloatGroup load_group(const float* p) { return load(p); }
+inline void store_group(float* p, FloatGroup v) { store(p, v); }
+using StoredDoubleGroup = DoubleGroup __attribute__((may_alias, aligned(alignof(double))));
+inline DoubleGroup load_group(const double* p) { return *reinterpret_cast<const StoredDoubleGroup*>(p); }
+inline void store_group(double* p, DoubleGroup v) { *reinterpret_cast<StoredDoubleGroup*>(p) = v; }
+
+template <class Number>
+using GroupOf = decltype(load_group(static_cast<const Number*>(nullptr)));
+template <class Group>
+constexpr Index kVertices = sizeof(Group) / sizeof(decltype(Group{}[0])) / 4;
+
+/// The number c of each vertex in its four.
+template <Index c, class Group>
+inline Group repeat_number(Group v) {
+  if constexpr (kVertices<Group> == 4)
+    return __builtin_shufflevector(v, v, c, c, c, c, 4 + c, 4 + c, 4 + c, 4 + c, 8 + c, 8 + c, 8 + c, 8 + c, 12 + c,
+                                   12 + c, 12 + c, 12 + c);
+  else if constexpr (kVertices<Group> == 2)
+    return __builtin_shufflevector(v, v, c, c, c, c, 4 + c, 4 + c, 4 + c, 4 + c);
+  else
+    return __builtin_shufflevector(v, v, c, c, c, c);
+}
+
+/// The vertices at places i and j of a, then those of b; in groups of four.
+template <Index i, Index j, class Group>
+inline Group choose_vertices(Group a, Group b) {
+  constexpr Index k = 4 * i, l = 4 * j;
+  return __builtin_shufflevector(a, b, k, k + 1, k + 2, k + 3, l, l + 1, l + 2, l + 3, 16 + k, 17 + k, 18 + k, 19 + k,
+                                 16 + l, 17 + l, 18 + l, 19 + l);
+}
+
+/// Vertex i of a, then vertex i of b; in groups of two.
+template <Index i, class Group>
+inline Group pair_vertices(Group a, Group b) {
+  constexpr Index k = 4 * i;
+  return __builtin_shufflevector(a, b, k, k + 1, k + 2, k + 3, 8 + k, 9 + k, 10 + k, 11 + k);
+}
+
+/// Vertex i of four, in all places of a group.
+template <Index i, class Group>
+inline Group repeat_vertex(const Group* v) {
+  if constexpr (kVertices<Group> == 4)
+    return choose_vertices<i, i>(v[0], v[0]);
+  else if constexpr (kVertices<Group> == 2)
+    return pair_vertices<i % 2>(v[i / 2], v[i / 2]);
+  else
+    return v[i];
+}
+
+/// Of four fields of groups, the sum of each over its vertices: four vertices.
+template <class Group>
+inline void add_vertices(const Group* v, Group* sums) {
+  if constexpr (kVertices<Group> == 4) {
+    const Group a = choose_vertices<0, 1>(v[0], v[1]) + choose_vertices<2, 3>(v[0], v[1]),
+                b = choose_vertices<0, 1>(v[2], v[3]) + choose_vertices<2, 3>(v[2], v[3]);
+    sums[0] = choose_vertices<0, 2>(a, b) + choose_vertices<1, 3>(a, b);
+  } else if constexpr (kVertices<Group> == 2) {
+    sums[0] = pair_vertices<0>(v[0], v[1]) + pair_vertices<1>(v[0], v[1]);
+    sums[1] = pair_vertices<0>(v[2], v[3]) + pair_vertices<1>(v[2], v[3]);
+  } else {
+    for (Index i = 0; i < 4; ++i) sums[i] = v[i];
+  }
+}
+
 template <class Four>
 inline void transpose(Four* rows) {
   const Four a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6),
@@ -234,27 +301,91 @@ void mesh_product(const MeshArrays& mesh, const float* matrix, const float* tang
   }
 }
 
-/// value - sum of numbers times the places at `indices`; kFactorMultiple of them at a time.
-inline FloatQuad less_products(FloatQuad value, const float* numbers, const int* indices, Index count, const float* x) {
-  FloatQuad sums[kFactorMultiple] = {value};
-  for (Index k = 0; k < count; k += kFactorMultiple)
-#pragma GCC unroll 4
-    for (Index i = 0; i < kFactorMultiple; ++i) sums[i] -= load_quad(x + 4 * indices[k + i]) * numbers[k + i];
-  return (sums[0] + sums[1]) + (sums[2] + sums[3]);
+// Blocks of kFactorBlock x kFactorBlock numbers, by rows: groups of rows.
+
+template <class Group>
+constexpr Index kRowGroups = kFactorBlock / kVertices<Group>;
+constexpr Index kFactorNumbers = 4 * kFactorBlock;
+
+template <class Number, class Group>
+inline void load_block(const Number* from, Group* block) {
+  for (Index part = 0; part < kRowGroups<Group>; ++part) block[part] = load_group(from + part * 4 * kVertices<Group>);
+}
+template <class Number, class Group>
+inline void store_block(Number* to, const Group* block) {
+  for (Index part = 0; part < kRowGroups<Group>; ++part) store_group(to + part * 4 * kVertices<Group>, block[part]);
 }
 
-void mesh_solve(const MeshFactor& factor, const float* right, float* x) {
-  for (Index i = 0; i < factor.size; ++i) {
-    const Index start = factor.row_starts[i];
-    store_quad(x + 4 * i, less_products(load_quad(right + 4 * i), factor.by_row + start, factor.columns + start,
-                                        factor.row_starts[i + 1] - start, x) *
-                              factor.inverse_diagonal[i]);
+template <class Group>
+inline void repeat_vertices(const Group* x, Group* repeated) {
+  repeated[0] = repeat_vertex<0>(x);
+  repeated[1] = repeat_vertex<1>(x);
+  repeated[2] = repeat_vertex<2>(x);
+  repeated[3] = repeat_vertex<3>(x);
+}
+
+/// image = B x, each vertex of x in all places of a group.
+template <class Number, class Group>
+inline void block_product(const Number* numbers, const Group* x, Group* image) {
+  Group block[kRowGroups<Group>];
+  load_block(numbers, block);
+  for (Index part = 0; part < kRowGroups<Group>; ++part)
+    image[part] = (repeat_number<0>(block[part]) * x[0] + repeat_number<1>(block[part]) * x[1]) +
+                  (repeat_number<2>(block[part]) * x[2] + repeat_number<3>(block[part]) * x[3]);
+}
+
+/// add_vertices() of sums [4] += B^T x.
+template <class Number, class Group>
+inline void add_transposed_product(const Number* numbers, const Number* x, Group* sums) {
+  Group block[kRowGroups<Group>], own[kRowGroups<Group>];
+  load_block(numbers, block);
+  load_block(x, own);
+  for (Index part = 0; part < kRowGroups<Group>; ++part) {
+    sums[0] += repeat_number<0>(block[part]) * own[part];
+    sums[1] += repeat_number<1>(block[part]) * own[part];
+    sums[2] += repeat_number<2>(block[part]) * own[part];
+    sums[3] += repeat_number<3>(block[part]) * own[part];
   }
-  for (Index i = factor.size - 1; i >= 0; --i) {
-    const Index start = factor.column_starts[i];
-    store_quad(x + 4 * i, less_products(load_quad(x + 4 * i), factor.by_column + start, factor.rows + start,
-                                        factor.column_starts[i + 1] - start, x) *
-                              factor.inverse_diagonal[i]);
+}
+
+float mesh_solve_lower(const MeshFactor& factor, const float* right, float* x) {
+  constexpr Index kGroups = kRowGroups<FloatGroup>;
+  FloatGroup squares[kGroups] = {};
+  std::memcpy(x, right, static_cast<std::size_t>(factor.blocks * kFactorNumbers) * sizeof(float));
+  for (Index column = 0; column < factor.blocks; ++column) {
+    FloatGroup own[kGroups], repeated[kFactorBlock], image[kGroups];
+    load_block(x + column * kFactorNumbers, own);
+    repeat_vertices(own, repeated);
+    block_product(factor.diagonal + 2 * column * kFactorNumbers, repeated, own);
+    store_block(x + column * kFactorNumbers, own);
+    for (Index part = 0; part < kGroups; ++part) squares[part] += own[part] * own[part];
+    repeat_vertices(own, repeated);
+    for (Index k = factor.starts[column]; k < factor.starts[column + 1]; ++k) {
+      float* const below = x + factor.rows[k] * kFactorNumbers;
+      block_product(factor.values + k * kFactorNumbers, repeated, image);
+      load_block(below, own);
+      for (Index part = 0; part < kGroups; ++part) own[part] -= image[part];
+      store_block(below, own);
+    }
+  }
+  float total = 0;
+  for (Index part = 0; part < kGroups; ++part)
+    for (Index i = 0; i < 4 * kVertices<FloatGroup>; ++i) total += squares[part][i];
+  return total;
+}
+
+void mesh_solve_upper(const MeshFactor& factor, float* x) {
+  constexpr Index kGroups = kRowGroups<FloatGroup>;
+  for (Index column = factor.blocks - 1; column >= 0; --column) {
+    FloatGroup sums[4] = {}, image[kGroups], own[kGroups], repeated[kFactorBlock];
+    for (Index k = factor.starts[column]; k < factor.starts[column + 1]; ++k)
+      add_transposed_product(factor.values + k * kFactorNumbers, x + factor.rows[k] * kFactorNumbers, sums);
+    add_vertices(sums, image);
+    load_block(x + column * kFactorNumbers, own);
+    for (Index part = 0; part < kGroups; ++part) own[part] -= image[part];
+    repeat_vertices(own, repeated);
+    block_product(factor.diagonal + (2 * column + 1) * kFactorNumbers, repeated, own);
+    store_block(x + column * kFactorNumbers, own);
   }
 }
 

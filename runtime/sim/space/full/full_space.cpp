@@ -105,7 +105,23 @@ void FullSpace::order_vertices(const TetMesh& mesh, const FlagVector& fixed, Fix
   pattern.setFromTriplets(entries.begin(), entries.end());
   Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> order;
   Eigen::AMDOrdering<int>()(pattern, order);
-  vertex_of_.assign(order.indices().data(), order.indices().data() + count);
+  // Blocks of the factor are of vertices that this order has side by side; in the order of their own graph they fill in
+  // less. The last one may have fewer.
+  const Eigen::VectorXi place_of_moving =
+      Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int>(order.inverse()).indices();
+  const Eigen::Index blocks = (count + kFactorBlock - 1) / kFactorBlock;
+  for (Eigen::Triplet<double>& entry : entries)
+    entry = {static_cast<int>(place_of_moving[entry.row()] / kFactorBlock),
+             static_cast<int>(place_of_moving[entry.col()] / kFactorBlock), 1.0};
+  Eigen::SparseMatrix<double> coarse(blocks, blocks);
+  coarse.setFromTriplets(entries.begin(), entries.end());
+  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> block_order;
+  Eigen::AMDOrdering<int>()(coarse, block_order);
+  std::vector<int> in_order(block_order.indices().data(), block_order.indices().data() + blocks);
+  std::ranges::stable_partition(in_order, [&](int block) { return block < count / kFactorBlock; });
+  for (const int block : in_order)
+    for (Eigen::Index k = kFactorBlock * block; k < std::min<Eigen::Index>(count, kFactorBlock * (block + 1)); ++k)
+      vertex_of_.push_back(order.indices()[k]);
   std::vector<std::int32_t> place(static_cast<std::size_t>(count));
   for (std::int32_t k = 0; k < count; ++k) place[static_cast<std::size_t>(vertex_of_[static_cast<std::size_t>(k)])] = k;
   place_of_ = moving;
@@ -390,26 +406,7 @@ FullPreconditioner::FullPreconditioner(const FullSpace& space, double mass_facto
       mass_factor * space.mass() + stiffness_factor * space.preconditioning_stiffness();
   const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>> factor(matrix);
   const Eigen::SparseMatrix<double> L = factor.matrixL();
-  const Eigen::SparseMatrix<double, Eigen::RowMajor> rows = L;
-  const auto take = [](const auto& matrix_of, std::vector<std::int32_t>& starts, std::vector<std::int32_t>& indices,
-                       std::vector<float>& values) {
-    starts.push_back(0);
-    for (Eigen::Index outer = 0; outer < matrix_of.outerSize(); ++outer) {
-      for (typename std::decay_t<decltype(matrix_of)>::InnerIterator entry(matrix_of, outer); entry; ++entry)
-        if (entry.index() != outer) {
-          indices.push_back(static_cast<std::int32_t>(entry.index()));
-          values.push_back(static_cast<float>(entry.value()));
-        }
-      while ((std::ssize(indices) - starts.back()) % kFactorMultiple != 0) {
-        indices.push_back(0);
-        values.push_back(0);
-      }
-      starts.push_back(static_cast<std::int32_t>(indices.size()));
-    }
-  };
-  take(rows, row_starts_, columns_, by_row_);
-  take(L, column_starts_, rows_, by_column_);
-  for (Eigen::Index i = 0; i < size_; ++i) inverse_diagonal_.push_back(static_cast<float>(1 / L.coeff(i, i)));
+  take_blocks(L);
 
   if (with_diagonal) diagonal_ = diagonal_of_inverse(L);
 
@@ -429,15 +426,57 @@ FullPreconditioner::FullPreconditioner(const FullSpace& space, double mass_facto
   if (with_diagonal) diagonal_ -= (Z * root).rowwise().squaredNorm();
 }
 
-void FullPreconditioner::solve(const Kernels& run, const AlignedFloats& right, AlignedFloats& x,
-                               AlignedFloats& coefficients) const noexcept {
-  run.mesh_solve({size_, row_starts_.data(), columns_.data(), column_starts_.data(), rows_.data(), by_row_.data(),
-                  by_column_.data(), inverse_diagonal_.data()},
-                 right.data(), x.data());
-  if (functions_.size() == 0) return;
-  const MeshFilter<float> filter{size_, stride_, functions_.data()};
-  run.mesh_rounded_coefficients(filter, right.data(), coefficients.data());
-  run.mesh_add_rounded_functions(filter, -1, coefficients.data(), x.data());
+void FullPreconditioner::take_blocks(const Eigen::SparseMatrix<double>& L) {
+  using Block = Eigen::Matrix<float, kFactorBlock, kFactorBlock, Eigen::RowMajor>;
+  const Eigen::Index blocks = (size_ + kFactorBlock - 1) / kFactorBlock;
+  std::vector<Block> values, diagonal;
+  std::vector<Eigen::Matrix4d> column(static_cast<std::size_t>(blocks), Eigen::Matrix4d::Zero());
+  for (Eigen::Index own = 0; own < blocks; ++own) {
+    const Eigen::Index begin = kFactorBlock * own, width = std::min(kFactorBlock, size_ - begin);
+    std::set<std::int32_t> found;
+    for (Eigen::Index k = 0; k < width; ++k)
+      for (Eigen::SparseMatrix<double>::InnerIterator entry(L, begin + k); entry; ++entry) {
+        column[static_cast<std::size_t>(entry.index() / kFactorBlock)](entry.index() % kFactorBlock, k) = entry.value();
+        found.insert(static_cast<std::int32_t>(entry.index() / kFactorBlock));
+      }
+    for (const std::int32_t row : found) {
+      Eigen::Matrix4d& block = column[static_cast<std::size_t>(row)];
+      if (row == own) {
+        Eigen::Matrix4d inverse = Eigen::Matrix4d::Zero();
+        inverse.topLeftCorner(width, width) = block.topLeftCorner(width, width).inverse();
+        diagonal.push_back(inverse.cast<float>());
+        diagonal.push_back(inverse.transpose().cast<float>());
+      } else {
+        rows_.push_back(row);
+        values.push_back(block.cast<float>());
+      }
+      block.setZero();
+    }
+    starts_.push_back(static_cast<std::int32_t>(rows_.size()));
+  }
+  const auto join = [](const std::vector<Block>& all) {
+    AlignedFloats joined(std::ssize(all) * Block::SizeAtCompileTime);
+    for (std::size_t i = 0; i < all.size(); ++i)
+      std::copy_n(all[i].data(), Block::SizeAtCompileTime, joined.data() + i * Block::SizeAtCompileTime);
+    return joined;
+  };
+  values_ = join(values);
+  diagonal_blocks_ = join(diagonal);
+}
+
+float FullPreconditioner::begin_solve(const Kernels& run, const AlignedFloats& right, AlignedFloats& x,
+                                      AlignedFloats& coefficients) const noexcept {
+  float square = run.mesh_solve_lower(factor(), right.data(), x.data());
+  if (functions_.size() == 0) return square;
+  run.mesh_rounded_coefficients({size_, stride_, functions_.data()}, right.data(), coefficients.data());
+  return square - coefficients.vector().squaredNorm();
+}
+
+void FullPreconditioner::end_solve(const Kernels& run, AlignedFloats& x,
+                                   const AlignedFloats& coefficients) const noexcept {
+  run.mesh_solve_upper(factor(), x.data());
+  if (functions_.size() > 0)
+    run.mesh_add_rounded_functions({size_, stride_, functions_.data()}, -1, coefficients.data(), x.data());
 }
 
 }  // namespace exmat::runtime

@@ -180,16 +180,29 @@ class FullPreconditioner {
 
   /// x = (S (x) I3)^-1 right, fields; coefficients: 3 x stride of the filter.
   void solve(const Kernels& run, const AlignedFloats& right, AlignedFloats& x,
-             AlignedFloats& coefficients) const noexcept;
+             AlignedFloats& coefficients) const noexcept {
+    begin_solve(run, right, x, coefficients);
+    end_solve(run, x, coefficients);
+  }
+  /// Half of that: returns right . (S (x) I3)^-1 right. end_solve() takes x and coefficients from there to the
+  /// solution.
+  float begin_solve(const Kernels& run, const AlignedFloats& right, AlignedFloats& x,
+                    AlignedFloats& coefficients) const noexcept;
+  void end_solve(const Kernels& run, AlignedFloats& x, const AlignedFloats& coefficients) const noexcept;
 
   /// [n] of S^-1 [m/N], if asked for.
   const Eigen::VectorXd& inverse_diagonal() const { return diagonal_; }
 
  private:
+  void take_blocks(const Eigen::SparseMatrix<double>& L);
+  MeshFactor factor() const noexcept {
+    return {std::ssize(starts_) - 1, starts_.data(), rows_.data(), values_.data(), diagonal_blocks_.data()};
+  }
+
   Eigen::Index size_ = 0, stride_ = 0;
   Eigen::VectorXd diagonal_;
-  std::vector<std::int32_t> row_starts_, columns_, column_starts_, rows_;
-  std::vector<float> by_row_, by_column_, inverse_diagonal_;
+  std::vector<std::int32_t> starts_{0}, rows_;
+  AlignedFloats values_, diagonal_blocks_;
   AlignedFloats functions_;  ///< the filter's part, subtracted as a square
 };
 

@@ -358,31 +358,38 @@ void FullStep::see_coefficients() noexcept {
     potential_.see(model_.examples[group], workspace_.examples[group].coefficients);
 }
 
-// Sets solved = B residual; with contacts B = C S^-1 C, C = (I + z K)^-1/2 at each vertex that touches: exact of a
-// single one.
 void FullStep::precondition() noexcept {
-  precondition_freely();
-  project_held(space_, memory_.attachments, workspace_.solved.data());
+  begin_preconditioning();
+  end_preconditioning();
 }
 
-void FullStep::precondition_freely() noexcept {
+// Towards solved = B residual; returns residual . B residual. With contacts B = C S^-1 C, C = (I + z K)^-1/2 at each
+// vertex that touches: exact of a single one.
+float FullStep::begin_preconditioning() noexcept {
   FullWorkspace& work = workspace_;
   const Kernels& run = kernels();
   const bool turns = model_.skin && linear_->is_filtered;
   if (work.contact.block_count == 0 && !turns)
-    return linear_->preconditioner.solve(run, work.residual, work.solved, work.coefficients);
-  const auto blocks = std::span(work.contact.blocks).first(work.contact.block_count);
+    return linear_->preconditioner.begin_solve(run, work.residual, work.solved, work.coefficients);
   work.scaled.vector() = work.residual.vector();
-  for (const auto& block : blocks) {
-    auto own = work.scaled.vector().segment<3>(4 * block.place);
-    own = (block.scale * own).eval();
-  }
+  scale_blocks(work.scaled);
   // The filter is that of the displacement in the axes of the bones.
   if (turns) model_.skin->turn_back(work.potential.skin, work.scaled.data(), work.scaled.data());
-  linear_->preconditioner.solve(run, work.scaled, work.solved, work.coefficients);
-  if (turns) model_.skin->turn(work.potential.skin, work.solved.data(), work.solved.data());
-  for (const auto& block : blocks) {
-    auto own = work.solved.vector().segment<3>(4 * block.place);
+  return linear_->preconditioner.begin_solve(run, work.scaled, work.solved, work.coefficients);
+}
+
+void FullStep::end_preconditioning() noexcept {
+  FullWorkspace& work = workspace_;
+  linear_->preconditioner.end_solve(kernels(), work.solved, work.coefficients);
+  if (model_.skin && linear_->is_filtered)
+    model_.skin->turn(work.potential.skin, work.solved.data(), work.solved.data());
+  scale_blocks(work.solved);
+  project_held(space_, memory_.attachments, work.solved.data());
+}
+
+void FullStep::scale_blocks(AlignedFloats& field) noexcept {
+  for (const auto& block : std::span(workspace_.contact.blocks).first(workspace_.contact.block_count)) {
+    auto own = field.vector().segment<3>(4 * block.place);
     own = (block.scale * own).eval();
   }
 }
@@ -479,10 +486,10 @@ FullStep::Outcome FullStep::find_direction(double tolerance) noexcept {
   set_scales();
   const double size = work.gradient.norm();
   residual = (work.gradient * (-1 / size)).cast<float>();
-  precondition();
+  float square = begin_preconditioning();
+  end_preconditioning();
   search = solved;
   sum.setZero();
-  float square = residual.dot(solved);
   const float limit = static_cast<float>(tolerance * tolerance) * square;
   for (int iteration = 1;; ++iteration) {
     multiply();
@@ -497,9 +504,9 @@ FullStep::Outcome FullStep::find_direction(double tolerance) noexcept {
     sum += length * search;
     if (iteration >= (near_ ? std::max(work.accuracy.iterations, kContactIterations) : work.accuracy.iterations)) break;
     residual -= length * image;
-    precondition();
-    const float next = residual.dot(solved);
+    const float next = begin_preconditioning();
     if (!(next > limit)) break;
+    end_preconditioning();
     search = solved + next / square * search;
     square = next;
   }

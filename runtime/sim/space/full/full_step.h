@@ -176,7 +176,9 @@ class FullStep {
                     Eigen::VectorXd& own) const noexcept;
   void carry(Eigen::VectorXd& d) const noexcept;
   bool find_contacts(double pushed) noexcept;
-  void precondition_freely() noexcept;
+  float begin_preconditioning() noexcept;
+  void end_preconditioning() noexcept;
+  void scale_blocks(AlignedFloats& field) noexcept;
   void filter_coefficients() noexcept;
   void hold(Eigen::VectorXd& d) const noexcept;
   void end_attachments() noexcept;
