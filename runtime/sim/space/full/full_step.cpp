@@ -12,6 +12,7 @@ constexpr double kMostPredicted = 0.5;  // of an edge, that an unchecked predict
 constexpr double kSlow = 0.1;           // of the residual: tangents that leave more are evaluated again
 constexpr int kFarFromFrozen = 12;      // iterations after which the frame of a free body goes along with it
 constexpr int kContactIterations = 60;  // of conjugate gradients near obstacles, at most
+constexpr double kWeakFilter = 0.25;    // of the mass's share, that the preconditioner does without
 constexpr double kLongStep = 0.008;     // [s]
 constexpr double kDelicate = 0.1;       // of the accuracy, in long steps and without damping of stiffness
 constexpr double kForcing = 0.3;        // of what is left to the tolerance, that a direction is solved to
@@ -58,6 +59,8 @@ FullWorkspace::Linear make_linear(const FullModel& model, const FullWorkspace::K
     of_functions.segment(examples.first, examples.functions).setConstant(filter);
   }
   linear.is_filtered = !of_functions.isZero(0);
+  // Beside the mass a weak filter changes no more than what conjugate gradients do anyway.
+  if (of_functions.size() > 0 && of_functions.maxCoeff() <= kWeakFilter * mass) of_functions.setZero();
   linear.preconditioner = FullPreconditioner(space, mass, stiffness + elasticity, of_functions, touches);
   for (Eigen::Index k = 0; k < space.entries(); ++k)
     linear.matrix.push_back(static_cast<float>(mass * space.mass_value(k) + stiffness * space.variance_value(k)));
@@ -118,10 +121,11 @@ FullWorkspace::FullWorkspace(const FullModel& model, const StepScene& scene, con
       search(residual),
       image(residual),
       sum(residual),
-      coefficients(3 * model.space.filter().stride),
+      coefficients(model.space.coefficients()),
       scaled(residual),
       turned(model.skin ? residual.size() : 0),
-      field(d) {
+      field(d),
+      modes(model.basis.cols()) {
   fit(model, scene);
   for (const FullExamples& of_model : model.examples) {
     Examples& own = examples.emplace_back();
@@ -417,8 +421,7 @@ void FullStep::hold(Eigen::VectorXd& d) const noexcept {
 
 // Turns F^T x into the forces of the filters on it.
 void FullStep::filter_coefficients() noexcept {
-  const Eigen::Index stride = space_.filter().stride;
-  Eigen::Map<Eigen::Matrix<float, 3, Eigen::Dynamic, Eigen::RowMajor>> all(workspace_.coefficients.data(), 3, stride);
+  Eigen::Map<Eigen::Matrix4Xf> all(workspace_.coefficients.data(), 4, space_.coefficients() / 4);
   Eigen::Matrix3f to_world = Eigen::Matrix3f::Identity();
   if (potential_.has_moving_frame()) to_world = potential_.frame_rotation().cast<float>();
   for (const FullWorkspace::Filter& filter : linear_->filters) {
@@ -429,14 +432,14 @@ void FullStep::filter_coefficients() noexcept {
     }
     Eigen::Map<Eigen::Matrix3Xf> numbers(workspace_.of_group.data(), 3, filter.columns);
     Eigen::Map<Eigen::Matrix3Xf> forces(workspace_.of_group.data() + numbers.size(), 3, filter.columns);
-    numbers = own;
+    numbers = own.topRows<3>();
     if (potential_.has_moving_frame())
       for (Eigen::Index k = 0; k < filter.columns; ++k) numbers.col(k) = (to_world.transpose() * numbers.col(k)).eval();
     Eigen::Map<Eigen::VectorXf>(forces.data(), forces.size()).noalias() =
         filter.product * Eigen::Map<const Eigen::VectorXf>(numbers.data(), numbers.size());
     if (potential_.has_moving_frame())
       for (Eigen::Index k = 0; k < filter.columns; ++k) forces.col(k) = (to_world * forces.col(k)).eval();
-    own = forces;
+    own.topRows<3>() = forces;
   }
 }
 
@@ -445,7 +448,7 @@ void FullStep::multiply() noexcept {
   const Kernels& run = kernels();
   FullWorkspace& work = workspace_;
   run.mesh_product(space_.arrays(), linear_->matrix.data(), work.potential.tangents.data(), work.search.data(),
-                   work.image.data());
+                   reinterpret_cast<float*>(work.potential.lines.data()), work.image.data());
   if (linear_->is_filtered) {
     const MeshFilter<float> filter = space_.rounded_filter();
     if (model_.skin) {

@@ -79,6 +79,7 @@ struct FullWorkspace {
   AlignedFloats turned;                                              ///< in the axes of bones, where there are some
   FullContactScratch contact;
   Eigen::VectorXd field;     ///< a field
+  AlignedArray modes;        ///< padded(r)
   Eigen::VectorXf of_group;  ///< coefficients of a group, and forces on them
   struct Examples {
     TargetTable::Workspace table;
