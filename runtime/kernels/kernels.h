@@ -197,21 +197,27 @@ inline constexpr std::ptrdiff_t kPlaneFactors = 3 * kLanes;
 // All vertices of a mesh. Fields hold four numbers for each of the n vertices that move: x, y, z and 0.
 inline constexpr std::ptrdiff_t kMeshLanes = 16;  ///< elements of a panel, of the floats of a wide register
 
-/// Elements of common/mesh/elements.h, and two symmetric scalar matrices [n x n] on one pattern.
+inline constexpr std::ptrdiff_t kMeshGroup = 4;
+/// Elements of common/mesh/elements.h, and two symmetric scalar matrices [n x n] on one pattern. kMeshGroup
+/// lists stand side by side, number by number, as long as the longest of them: the others end with zeros.
 struct MeshArrays {
   std::ptrdiff_t vertices = 0;               ///< n
   std::ptrdiff_t panels = 0;                 ///< panels of kMeshLanes elements; those that pad have no corners
-  const int* starts = nullptr;               ///< panels x kMeshLanes + 1, into `corners`
+  const int* starts = nullptr;               ///< panels x kMeshLanes / kMeshGroup + 1, into lists, see above
   const int* corners = nullptr;              ///< vertices of each element that move
-  const double* gradients = nullptr;         ///< three of each corner [1/m]
+  const double* gradients = nullptr;         ///< three of each corner [1/m], and one more number at the end
   const float* rounded_gradients = nullptr;  ///< the same
   /// panels x kMeshLanes, V beta mu of smoothed elements: the variance term is that of the tets less this of the rings.
   const double* variance = nullptr;
   const int* rows = nullptr;        ///< n, in an order in which rows of one length are together
   const int* row_starts = nullptr;  ///< n + 1, in that order, into `columns`
   const int* columns = nullptr;
-  const double* mass = nullptr;             ///< [kg]
-  const double* variance_matrix = nullptr;  ///< sum over the tets of V beta mu grad N_i . grad N_j [N/m]
+  const int* around_starts = nullptr;               ///< of each kMeshGroup of `rows`, and one more, into lists
+  const int* around = nullptr;                      ///< elements that have the vertex as a corner
+  const double* gradients_around = nullptr;         ///< three of each, and one more number at the end, as above
+  const float* rounded_gradients_around = nullptr;  ///< the same
+  const double* mass = nullptr;                     ///< [kg]
+  const double* variance_matrix = nullptr;          ///< sum over the tets of V beta mu grad N_i . grad N_j [N/m]
 };
 
 /// Fields of a step's potential besides the law: x, a = q - q_a and w = q - q_v, see StepForm.
@@ -223,21 +229,28 @@ struct MeshInertia {
 };
 /// Inertia 1/2 c_a a M a, damping 1/2 c_v w D w, elastic energy, that of an elastic example force [J].
 inline constexpr std::ptrdiff_t kMeshSums = 4;
+inline constexpr std::ptrdiff_t kMeshLine = 16;  ///< numbers of scratch of an element
 
-inline constexpr std::ptrdiff_t kFactorMultiple = 4;
-/// L L^T of a scalar matrix [n x n], L below its diagonal by rows and by columns, each padded with zeros to a multiple
-/// of kFactorMultiple.
+inline constexpr std::ptrdiff_t kFactorBlock = 4;
+/// L L^T of a scalar matrix in blocks of kFactorBlock rows and columns, each by rows; what pads the last one is zero.
 struct MeshFactor {
-  std::ptrdiff_t size = 0;
-  const int *row_starts = nullptr, *columns = nullptr, *column_starts = nullptr, *rows = nullptr;
-  const float *by_row = nullptr, *by_column = nullptr, *inverse_diagonal = nullptr;
+  std::ptrdiff_t blocks = 0;        ///< along the diagonal
+  const int* starts = nullptr;      ///< blocks + 1, into `rows`
+  const int* rows = nullptr;        ///< of the blocks below each one on the diagonal that are not zero
+  const float* values = nullptr;    ///< those blocks
+  const float* diagonal = nullptr;  ///< inverse of each block on the diagonal, and its transpose
 };
 
-/// m scalar functions of the vertices: n x stride, rows padded with zeros to kMeshLanes. Coefficients: 3 x stride.
+/// Scalar functions of n vertices, columns of a matrix in blocks of kFactorBlock vertices x kFactorBlock functions,
+/// each by rows; what pads the last ones is zero. Coefficients: four numbers of each function, of as many as blocks
+/// have.
 template <class Number>
 struct MeshFilter {
-  std::ptrdiff_t vertices = 0, stride = 0;
-  const Number* functions = nullptr;
+  std::ptrdiff_t vertices = 0;     ///< n
+  std::ptrdiff_t blocks = 0;       ///< of functions
+  const int* starts = nullptr;     ///< blocks + 1, into `rows`
+  const int* rows = nullptr;       ///< blocks of vertices where a block of functions is not zero
+  const Number* values = nullptr;  ///< those blocks
 };
 
 struct Kernels {
@@ -407,7 +420,8 @@ struct Kernels {
   /// values: all polynomials at weights [K], in order; scratch: lane_bernstein_scratch(D, K).
   void (*lanes_bernstein)(const BernsteinArrays&, const double* weights, double* scratch, double* values);
 
-  // Elasticity of a whole mesh, see above; the law is that of a material, without shifts, times the volumes.
+  // Elasticity of a whole mesh, see above; the law is that of a material, without shifts, times the volumes. lines:
+  // scratch, padded elements x kMeshLine.
 
   /// inertia = c_a M a, force = c_v (alpha M + beta V) w + V x, V the variance matrix; sums [kMeshSums] of these terms.
   void (*mesh_inertia)(const MeshArrays&, const MeshInertia&, double* inertia, double* force, double* sums);
@@ -415,15 +429,19 @@ struct Kernels {
   /// kind with one shift and its inverse. frozen: padded elements x 45 in panels of kLanes, their tangents that damping
   /// has, without those of the example; not read where there is no such damping.
   void (*mesh_force)(const MeshArrays&, const ElementLaw&, const ElementLaw* example, const MeshInertia&,
-                     const double* frozen, double* force, double* sums);
+                     const double* frozen, double* lines, double* force, double* sums);
   /// The same, and tangents: panels x 45 x kMeshLanes, those at x and beta c_v times the frozen ones. `freeze`: sets
   /// the frozen ones to those at x first.
   void (*mesh_force_and_tangents)(const MeshArrays&, const ElementLaw&, const ElementLaw* example, const MeshInertia&,
-                                  bool freeze, double* frozen, float* tangents, double* force, double* sums);
+                                  bool freeze, double* frozen, float* tangents, double* lines, double* force,
+                                  double* sums);
   /// product = matrix x + sum over the elements of B^T T B x; the matrix on the pattern of the mass.
-  void (*mesh_product)(const MeshArrays&, const float* matrix, const float* tangents, const float* x, float* product);
-  /// x = (L L^T)^-1 right.
-  void (*mesh_solve)(const MeshFactor&, const float* right, float* x);
+  void (*mesh_product)(const MeshArrays&, const float* matrix, const float* tangents, const float* x, float* lines,
+                       float* product);
+  /// x = L^-1 right; returns x . x. Fields of as many vertices as the blocks have rows.
+  float (*mesh_solve_lower)(const MeshFactor&, const float* right, float* x);
+  /// x <- L^-T x.
+  void (*mesh_solve_upper)(const MeshFactor&, float* x);
   /// coefficients = functions^T field; field += factor functions coefficients.
   void (*mesh_coefficients)(const MeshFilter<double>&, const double* field, double* coefficients);
   void (*mesh_rounded_coefficients)(const MeshFilter<float>&, const float* field, float* coefficients);

@@ -5,6 +5,8 @@
 #include <immintrin.h>
 #endif
 
+#include <algorithm>
+#include <cstring>
 #include <type_traits>
 #include <utility>
 
@@ -485,7 +487,8 @@ const Kernels EXMAT_SIMD_KERNELS{EXMAT_SIMD_NAME,
                                  mesh_force,
                                  mesh_force_and_tangents,
                                  mesh_product,
-                                 mesh_solve,
+                                 mesh_solve_lower,
+                                 mesh_solve_upper,
                                  mesh_coefficients,
                                  mesh_rounded_coefficients,
                                  mesh_add_functions,

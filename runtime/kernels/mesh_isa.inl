@@ -14,6 +14,73 @@ inline void store_quad(float* p, FloatQuad v) { *reinterpret_cast<StoredFloatQua
 template <class Number>
 using QuadOf = decltype(load_quad(static_cast<const Number*>(nullptr)));
 
+/// A group: as many vertices as a register holds, at least one.
+using FloatGroup = FloatVec;
+using DoubleGroup = std::conditional_t<(kWidth < 4), Quad, Vec>;
+inline FloatGroup load_group(const float* p) { return load(p); }
+inline void store_group(float* p, FloatGroup v) { store(p, v); }
+using StoredDoubleGroup = DoubleGroup __attribute__((may_alias, aligned(alignof(double))));
+inline DoubleGroup load_group(const double* p) { return *reinterpret_cast<const StoredDoubleGroup*>(p); }
+inline void store_group(double* p, DoubleGroup v) { *reinterpret_cast<StoredDoubleGroup*>(p) = v; }
+
+template <class Number>
+using GroupOf = decltype(load_group(static_cast<const Number*>(nullptr)));
+template <class Group>
+constexpr Index kVertices = sizeof(Group) / sizeof(decltype(Group{}[0])) / 4;
+
+/// The number c of each vertex in its four.
+template <Index c, class Group>
+inline Group repeat_number(Group v) {
+  if constexpr (kVertices<Group> == 4)
+    return __builtin_shufflevector(v, v, c, c, c, c, 4 + c, 4 + c, 4 + c, 4 + c, 8 + c, 8 + c, 8 + c, 8 + c, 12 + c,
+                                   12 + c, 12 + c, 12 + c);
+  else if constexpr (kVertices<Group> == 2)
+    return __builtin_shufflevector(v, v, c, c, c, c, 4 + c, 4 + c, 4 + c, 4 + c);
+  else
+    return __builtin_shufflevector(v, v, c, c, c, c);
+}
+
+/// The vertices at places i and j of a, then those of b; in groups of four.
+template <Index i, Index j, class Group>
+inline Group choose_vertices(Group a, Group b) {
+  constexpr Index k = 4 * i, l = 4 * j;
+  return __builtin_shufflevector(a, b, k, k + 1, k + 2, k + 3, l, l + 1, l + 2, l + 3, 16 + k, 17 + k, 18 + k, 19 + k,
+                                 16 + l, 17 + l, 18 + l, 19 + l);
+}
+
+/// Vertex i of a, then vertex i of b; in groups of two.
+template <Index i, class Group>
+inline Group pair_vertices(Group a, Group b) {
+  constexpr Index k = 4 * i;
+  return __builtin_shufflevector(a, b, k, k + 1, k + 2, k + 3, 8 + k, 9 + k, 10 + k, 11 + k);
+}
+
+/// Vertex i of four, in all places of a group.
+template <Index i, class Group>
+inline Group repeat_vertex(const Group* v) {
+  if constexpr (kVertices<Group> == 4)
+    return choose_vertices<i, i>(v[0], v[0]);
+  else if constexpr (kVertices<Group> == 2)
+    return pair_vertices<i % 2>(v[i / 2], v[i / 2]);
+  else
+    return v[i];
+}
+
+/// Of four fields of groups, the sum of each over its vertices: four vertices.
+template <class Group>
+inline void add_vertices(const Group* v, Group* sums) {
+  if constexpr (kVertices<Group> == 4) {
+    const Group a = choose_vertices<0, 1>(v[0], v[1]) + choose_vertices<2, 3>(v[0], v[1]),
+                b = choose_vertices<0, 1>(v[2], v[3]) + choose_vertices<2, 3>(v[2], v[3]);
+    sums[0] = choose_vertices<0, 2>(a, b) + choose_vertices<1, 3>(a, b);
+  } else if constexpr (kVertices<Group> == 2) {
+    sums[0] = pair_vertices<0>(v[0], v[1]) + pair_vertices<1>(v[0], v[1]);
+    sums[1] = pair_vertices<0>(v[2], v[3]) + pair_vertices<1>(v[2], v[3]);
+  } else {
+    for (Index i = 0; i < 4; ++i) sums[i] = v[i];
+  }
+}
+
 template <class Four>
 inline void transpose(Four* rows) {
   const Four a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6),
@@ -26,60 +93,246 @@ inline void transpose(Four* rows) {
   rows[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
 
-inline const double* gradients_of(const MeshArrays& mesh, double) { return mesh.gradients; }
-inline const float* gradients_of(const MeshArrays& mesh, float) { return mesh.rounded_gradients; }
-
-/// H [9 x lanes] of the elements from `first` on, of a field of vertices.
-template <Index lanes, class Number>
-inline void gather_gradients(const MeshArrays& mesh, Index first, const Number* field, Number* H) {
-  const Number* gradients = gradients_of(mesh, Number{});
-  for (Index group = 0; group < lanes; group += 4) {
-    QuadOf<Number> columns[3][4];
-#pragma GCC unroll 4
-    for (Index i = 0; i < 4; ++i) {
-      QuadOf<Number> x{}, y{}, z{};
-      const Index element = first + group + i, end = mesh.starts[element + 1];
-      for (Index k = mesh.starts[element]; k < end; ++k) {
-        const QuadOf<Number> u = load_quad(field + 4 * mesh.corners[k]);
-        x += u * gradients[3 * k];
-        y += u * gradients[3 * k + 1];
-        z += u * gradients[3 * k + 2];
-      }
-      columns[0][i] = x;
-      columns[1][i] = y;
-      columns[2][i] = z;
-    }
-#pragma GCC unroll 3
-    for (Index b = 0; b < 3; ++b) {
-      transpose(columns[b]);
-#pragma GCC unroll 3
-      for (Index a = 0; a < 3; ++a) store_quad(H + (3 * a + b) * lanes + group, columns[b][a]);
-    }
+/// Transposes the 4 x 4 numbers of each place of four groups.
+template <class Group>
+inline void transpose_numbers(Group* rows) {
+  if constexpr (kVertices<Group> == 4) {
+    const auto low = [](Group a, Group b) {
+      return __builtin_shufflevector(a, b, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
+    };
+    const auto high = [](Group a, Group b) {
+      return __builtin_shufflevector(a, b, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
+    };
+    const auto first = [](Group a, Group b) {
+      return __builtin_shufflevector(a, b, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
+    };
+    const auto second = [](Group a, Group b) {
+      return __builtin_shufflevector(a, b, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31);
+    };
+    const Group a = low(rows[0], rows[1]), b = high(rows[0], rows[1]), c = low(rows[2], rows[3]),
+                d = high(rows[2], rows[3]);
+    rows[0] = first(a, c);
+    rows[1] = second(a, c);
+    rows[2] = first(b, d);
+    rows[3] = second(b, d);
+  } else if constexpr (kVertices<Group> == 2) {
+    const auto low = [](Group a, Group b) { return __builtin_shufflevector(a, b, 0, 8, 1, 9, 4, 12, 5, 13); };
+    const auto high = [](Group a, Group b) { return __builtin_shufflevector(a, b, 2, 10, 3, 11, 6, 14, 7, 15); };
+    const auto first = [](Group a, Group b) { return __builtin_shufflevector(a, b, 0, 1, 8, 9, 4, 5, 12, 13); };
+    const auto second = [](Group a, Group b) { return __builtin_shufflevector(a, b, 2, 3, 10, 11, 6, 7, 14, 15); };
+    const Group a = low(rows[0], rows[1]), b = high(rows[0], rows[1]), c = low(rows[2], rows[3]),
+                d = high(rows[2], rows[3]);
+    rows[0] = first(a, c);
+    rows[1] = second(a, c);
+    rows[2] = first(b, d);
+    rows[3] = second(b, d);
+  } else {
+    transpose(rows);
   }
 }
 
-/// forces += P b of the elements from `first` on, of stresses [9 x lanes].
-template <Index lanes, class Number>
-inline void scatter_stresses(const MeshArrays& mesh, Index first, const Number* P, Number* forces) {
-  const Number* gradients = gradients_of(mesh, Number{});
-  for (Index group = 0; group < lanes; group += 4) {
-    QuadOf<Number> columns[3][4];
-#pragma GCC unroll 3
-    for (Index b = 0; b < 3; ++b) {
-#pragma GCC unroll 3
-      for (Index a = 0; a < 3; ++a) columns[b][a] = load_quad(P + (3 * a + b) * lanes + group);
-      columns[b][3] = QuadOf<Number>{};
-      transpose(columns[b]);
-    }
+/// Transposes the vertices of as many groups as each has places.
+template <class Group>
+inline void transpose_vertices(Group* rows) {
+  if constexpr (kVertices<Group> == 4) {
+    const Group a = choose_vertices<0, 1>(rows[0], rows[1]), b = choose_vertices<2, 3>(rows[0], rows[1]),
+                c = choose_vertices<0, 1>(rows[2], rows[3]), d = choose_vertices<2, 3>(rows[2], rows[3]);
+    rows[0] = choose_vertices<0, 2>(a, c);
+    rows[1] = choose_vertices<1, 3>(a, c);
+    rows[2] = choose_vertices<0, 2>(b, d);
+    rows[3] = choose_vertices<1, 3>(b, d);
+  } else if constexpr (kVertices<Group> == 2) {
+    const Group a = pair_vertices<0>(rows[0], rows[1]);
+    rows[1] = pair_vertices<1>(rows[0], rows[1]);
+    rows[0] = a;
+  }
+}
+
+// The three columns of an element's 3 x 3 numbers stand side by side as vertices do: a line of kMeshLine numbers, of
+// which a register holds one group.
+
+template <class Group>
+constexpr Index kLineGroups = (3 + kVertices<Group> - 1) / kVertices<Group>;
+
+// A vertex in all places of a group: repeat(). Numbers of a gradient, of which four are read, each in the four of the
+// column that it belongs to: spread(); the number itself where a group is one vertex. Compilers make wider registers of
+// narrow ones by memory, if left alone.
+
+#if EXMAT_SIMD_WIDTH == 8
+inline FloatGroup repeat(const float* p) { return _mm512_maskz_broadcast_f32x4(0xffff, _mm_loadu_ps(p)); }
+inline DoubleGroup repeat(const double* p) { return _mm512_maskz_broadcast_f64x4(0xff, _mm256_loadu_pd(p)); }
+template <Index part>
+inline FloatGroup spread(const float* gradient) {
+  const __m512i places = _mm512_set_epi32(3, 3, 3, 3, 2, 2, 2, 2, 1, 1, 1, 1, 0, 0, 0, 0);
+  return _mm512_maskz_permutevar_ps(0xffff, repeat(gradient), places);
+}
+template <Index part>
+inline DoubleGroup spread(const double* gradient) {
+  constexpr Index a = 2 * part, b = a + 1;
+  return _mm512_maskz_permutexvar_pd(0xff, _mm512_set_epi64(b, b, b, b, a, a, a, a), repeat(gradient));
+}
+#elif EXMAT_SIMD_WIDTH == 4
+inline FloatGroup repeat(const float* p) { return _mm256_broadcast_ps(reinterpret_cast<const __m128*>(p)); }
+inline DoubleGroup repeat(const double* p) { return load_quad(p); }
+template <Index part>
+inline FloatGroup spread(const float* gradient) {
+  constexpr int a = 2 * part, b = a + 1;
+  return _mm256_permutevar_ps(repeat(gradient), _mm256_set_epi32(b, b, b, b, a, a, a, a));
+}
+template <Index part>
+inline double spread(const double* gradient) {
+  return gradient[part];
+}
+#else
+inline FloatGroup repeat(const float* p) { return load_quad(p); }
+inline DoubleGroup repeat(const double* p) { return load_quad(p); }
+template <Index part, class Number>
+inline Number spread(const Number* gradient) {
+  return gradient[part];
+}
+#endif
+
+inline const double* gradients_of(const MeshArrays& mesh, double) { return mesh.gradients; }
+inline const float* gradients_of(const MeshArrays& mesh, float) { return mesh.rounded_gradients; }
+inline const double* gradients_around(const MeshArrays& mesh, double) { return mesh.gradients_around; }
+inline const float* gradients_around(const MeshArrays& mesh, float) { return mesh.rounded_gradients_around; }
+
+/// Displacement gradients of elements in lines, by groups, to H [9 x lanes].
+template <Index lanes, class Number, class Group>
+inline void lines_to_lanes(const Group (*lines)[kLineGroups<Group>], Number* H) {
+  constexpr Index count = kVertices<Group>;
 #pragma GCC unroll 4
-    for (Index i = 0; i < 4; ++i) {
-      const Index element = first + group + i, end = mesh.starts[element + 1];
-      for (Index k = mesh.starts[element]; k < end; ++k) {
-        Number* force = forces + 4 * mesh.corners[k];
-        store_quad(force, load_quad(force) + columns[0][i] * gradients[3 * k] + columns[1][i] * gradients[3 * k + 1] +
-                              columns[2][i] * gradients[3 * k + 2]);
+  for (Index begin = 0; begin < lanes; begin += 4 * count)
+#pragma GCC unroll 3
+    for (Index part = 0; part < kLineGroups<Group>; ++part) {
+      Group turned[count][4];
+#pragma GCC unroll 4
+      for (Index group = 0; group < count; ++group) {
+#pragma GCC unroll 4
+        for (Index i = 0; i < 4; ++i) turned[group][i] = lines[begin + 4 * group + i][part];
+        transpose_numbers(turned[group]);
+      }
+#pragma GCC unroll 3
+      for (Index a = 0; a < 3; ++a) {
+        Group across[count];
+#pragma GCC unroll 4
+        for (Index group = 0; group < count; ++group) across[group] = turned[group][a];
+        transpose_vertices(across);
+#pragma GCC unroll 4
+        for (Index i = 0; i < count; ++i)
+          if (part * count + i < 3) store_group(H + (3 * a + part * count + i) * lanes + begin, across[i]);
       }
     }
+}
+
+/// Stresses P [9 x lanes] of elements to their lines.
+template <Index lanes, class Number>
+inline void lanes_to_lines(const Number* P, Number* lines) {
+  using Group = GroupOf<Number>;
+  constexpr Index count = kVertices<Group>;
+#pragma GCC unroll 4
+  for (Index begin = 0; begin < lanes; begin += 4 * count)
+#pragma GCC unroll 3
+    for (Index part = 0; part < kLineGroups<Group>; ++part) {
+      Group turned[count][4] = {};
+#pragma GCC unroll 3
+      for (Index a = 0; a < 3; ++a) {
+        Group across[count] = {};
+#pragma GCC unroll 4
+        for (Index i = 0; i < count; ++i)
+          if (part * count + i < 3) across[i] = load_group(P + (3 * a + part * count + i) * lanes + begin);
+        transpose_vertices(across);
+#pragma GCC unroll 4
+        for (Index group = 0; group < count; ++group) turned[group][a] = across[group];
+      }
+#pragma GCC unroll 4
+      for (Index group = 0; group < count; ++group) {
+        transpose_numbers(turned[group]);
+#pragma GCC unroll 4
+        for (Index i = 0; i < 4; ++i)
+          store_group(lines + (begin + 4 * group + i) * kMeshLine + part * 4 * count, turned[group][i]);
+      }
+    }
+}
+
+/// Lists of kMeshGroup that are gone through at once: as many as have sums in registers.
+template <class Group, Index fields>
+constexpr Index kTogether = std::clamp<Index>(2 * kWidth * Index(sizeof(Vec)) /
+                                                  (fields * kLineGroups<Group> * Index(sizeof(Group))),
+                                              1, kMeshGroup);
+
+/// H [9 x lanes] of the elements from `first` on, of each of some fields of vertices.
+template <Index lanes, Index fields, class Number>
+inline void gather_gradients(const MeshArrays& mesh, Index first, const Number* const* of, Number* const* H) {
+  using Group = GroupOf<Number>;
+  constexpr Index together = kTogether<Group, fields>;
+  Group lines[fields][lanes][kLineGroups<Group>];
+  for (Index lane = 0; lane < lanes; lane += together) {
+    Group sums[fields][together][kLineGroups<Group>] = {};
+    const Index list = (first + lane) / kMeshGroup, end = mesh.starts[list + 1];
+    const Index begin = mesh.starts[list] * kMeshGroup + lane % kMeshGroup;
+    const int* corner = mesh.corners + begin;
+    const Number* gradient = gradients_of(mesh, Number{}) + 3 * begin;
+    for (Index k = mesh.starts[list]; k < end; ++k, corner += kMeshGroup, gradient += 3 * kMeshGroup)
+#pragma GCC unroll 4
+      for (Index i = 0; i < together; ++i)
+#pragma GCC unroll 2
+        for (Index field = 0; field < fields; ++field) {
+          const Group x = repeat(of[field] + 4 * Index(corner[i]));
+          Group* const own = sums[field][i];
+          own[0] += spread<0>(gradient + 3 * i) * x;
+          if constexpr (kLineGroups < Group >> 1) own[1] += spread<1>(gradient + 3 * i) * x;
+          if constexpr (kLineGroups < Group >> 2) own[2] += spread<2>(gradient + 3 * i) * x;
+        }
+#pragma GCC unroll 2
+    for (Index field = 0; field < fields; ++field)
+#pragma GCC unroll 4
+      for (Index i = 0; i < together; ++i)
+#pragma GCC unroll 3
+        for (Index part = 0; part < kLineGroups<Group>; ++part) lines[field][lane + i][part] = sums[field][i][part];
+  }
+#pragma GCC unroll 2
+  for (Index field = 0; field < fields; ++field) lines_to_lanes<lanes>(lines[field], H[field]);
+}
+
+/// The sum of the three columns of a line.
+template <class Number, class Group>
+inline QuadOf<Number> add_columns(const Group* line) {
+  if constexpr (kVertices<Group> == 4)
+    return (__builtin_shufflevector(line[0], line[0], 0, 1, 2, 3) +
+            __builtin_shufflevector(line[0], line[0], 4, 5, 6, 7)) +
+           __builtin_shufflevector(line[0], line[0], 8, 9, 10, 11);
+  else if constexpr (kVertices<Group> == 2)
+    return (__builtin_shufflevector(line[0], line[0], 0, 1, 2, 3) +
+            __builtin_shufflevector(line[0], line[0], 4, 5, 6, 7)) +
+           __builtin_shufflevector(line[1], line[1], 0, 1, 2, 3);
+  else
+    return (line[0] + line[1]) + line[2];
+}
+
+/// Calls use(row, sum of P b over the elements about its vertex) for all rows, P in lines.
+template <class Number, class Use>
+inline void gather_stresses(const MeshArrays& mesh, const Number* lines, const Use& use) {
+  using Group = GroupOf<Number>;
+  constexpr Index numbers = 4 * kVertices<Group>, together = kTogether<Group, 1>;
+  for (Index row = 0; row < mesh.vertices; row += together) {
+    Group sums[together][kLineGroups<Group>] = {};
+    const Index list = row / kMeshGroup, end = mesh.around_starts[list + 1];
+    const Index begin = mesh.around_starts[list] * kMeshGroup + row % kMeshGroup;
+    const int* element = mesh.around + begin;
+    const Number* gradient = gradients_around(mesh, Number{}) + 3 * begin;
+    for (Index k = mesh.around_starts[list]; k < end; ++k, element += kMeshGroup, gradient += 3 * kMeshGroup)
+#pragma GCC unroll 4
+      for (Index i = 0; i < together; ++i) {
+        const Number* line = lines + kMeshLine * Index(element[i]);
+        sums[i][0] += spread<0>(gradient + 3 * i) * load_group(line);
+        if constexpr (kLineGroups < Group >> 1) sums[i][1] += spread<1>(gradient + 3 * i) * load_group(line + numbers);
+        if constexpr (kLineGroups < Group >> 2)
+          sums[i][2] += spread<2>(gradient + 3 * i) * load_group(line + 2 * numbers);
+      }
+#pragma GCC unroll 4
+    for (Index i = 0; i < together; ++i)
+      if (row + i < mesh.vertices) use(row + i, add_columns<Number>(sums[i]));
   }
 }
 
@@ -98,6 +351,12 @@ inline void tangent_product(const Number* tangent, Index stride, const Lanes* x,
       image[j] += value * x[i];
     }
   }
+}
+
+inline void store_rounded(float* p, Vec v) {
+  using Half = float __attribute__((vector_size(kWidth * sizeof(float))));
+  using StoredHalf = Half __attribute__((may_alias, aligned(alignof(float))));
+  *reinterpret_cast<StoredHalf*>(p) = __builtin_convertvector(v, Half);
 }
 
 void mesh_inertia(const MeshArrays& mesh, const MeshInertia& terms, double* inertia_force, double* force,
@@ -133,16 +392,20 @@ void mesh_inertia(const MeshArrays& mesh, const MeshInertia& terms, double* iner
 /// As mesh_force() and mesh_force_and_tangents().
 template <Want want, class Law>
 inline void evaluate_mesh(const MeshArrays& mesh, const ElementLaw& law, const ElementLaw* example,
-                          const MeshInertia& terms, bool freeze, double* frozen, float* tangents, double* force,
-                          double* sums) {
+                          const MeshInertia& terms, bool freeze, double* frozen, float* tangents, double* lines,
+                          double* force, double* sums) {
   alignas(kAlignment) double H[9 * kLanes], rates[9 * kLanes], P[9 * kLanes], tangent[kTangentNumbers * kLanes];
   alignas(kAlignment) double example_tangent[want == Want::kStiffness ? kTangentNumbers * kLanes : kLanes];
   const bool damped = terms.stiffness_damping > 0;
   Vec elastic = zero(), damping = zero(), pulled = zero();
   for (Index first = 0; first < mesh.panels * kMeshLanes; first += kLanes) {
     double* const own_frozen = damped ? frozen + first * kTangentNumbers : nullptr;
-    gather_gradients<kLanes>(mesh, first, terms.displacement, H);
-    if (damped) gather_gradients<kLanes>(mesh, first, terms.rate, rates);
+    const double* const fields[] = {terms.displacement, terms.rate};
+    double* const gradients[] = {H, rates};
+    if (damped)
+      gather_gradients<kLanes, 2>(mesh, first, fields, gradients);
+    else
+      gather_gradients<kLanes, 1>(mesh, first, fields, gradients);
     for (Index lane = 0; lane < kLanes; lane += kWidth) {
       Vec h[9], p[9];
       for (Index i = 0; i < 9; ++i) h[i] = load(H + i * kLanes + lane);
@@ -176,147 +439,221 @@ inline void evaluate_mesh(const MeshArrays& mesh, const ElementLaw& law, const E
       }
       for (Index i = 0; i < 9; ++i) store(P + i * kLanes + lane, p[i]);
     }
-    scatter_stresses<kLanes>(mesh, first, P, force);
+    lanes_to_lines<kLanes>(P, lines + first * kMeshLine);
     if constexpr (want == Want::kStiffness) {
       float* const rounded = tangents + first / kMeshLanes * kTangentNumbers * kMeshLanes + first % kMeshLanes;
+      const double share = damped ? terms.stiffness_damping : 0;
+      const double* const other = damped ? own_frozen : tangent;
       for (Index k = 0; k < kTangentNumbers; ++k)
-        for (Index lane = 0; lane < kLanes; ++lane) {
-          double value = tangent[k * kLanes + lane];
-          if (damped) value += terms.stiffness_damping * own_frozen[k * kLanes + lane];
-          rounded[k * kMeshLanes + lane] = static_cast<float>(value);
-        }
+        for (Index lane = 0; lane < kLanes; lane += kWidth)
+          store_rounded(rounded + k * kMeshLanes + lane,
+                        load(tangent + k * kLanes + lane) + share * load(other + k * kLanes + lane));
     }
   }
+  gather_stresses(mesh, lines, [&](Index row, Quad own) {
+    double* const at = force + 4 * mesh.rows[row];
+    store_quad(at, load_quad(at) + own);
+  });
   sums[1] += 0.5 * sum(damping);
   sums[2] += sum(elastic);
   sums[3] += sum(pulled);
 }
 
 void mesh_force(const MeshArrays& mesh, const ElementLaw& law, const ElementLaw* example, const MeshInertia& terms,
-                const double* frozen, double* force, double* sums) {
+                const double* frozen, double* lines, double* force, double* sums) {
   with_law(law, [&]<class Law>() {
-    evaluate_mesh<Want::kForce, Law>(mesh, law, example, terms, false, const_cast<double*>(frozen), nullptr, force,
-                                     sums);
+    evaluate_mesh<Want::kForce, Law>(mesh, law, example, terms, false, const_cast<double*>(frozen), nullptr, lines,
+                                     force, sums);
   });
 }
 
 void mesh_force_and_tangents(const MeshArrays& mesh, const ElementLaw& law, const ElementLaw* example,
-                             const MeshInertia& terms, bool freeze, double* frozen, float* tangents, double* force,
-                             double* sums) {
+                             const MeshInertia& terms, bool freeze, double* frozen, float* tangents, double* lines,
+                             double* force, double* sums) {
   with_law(law, [&]<class Law>() {
-    evaluate_mesh<Want::kStiffness, Law>(mesh, law, example, terms, freeze, frozen, tangents, force, sums);
+    evaluate_mesh<Want::kStiffness, Law>(mesh, law, example, terms, freeze, frozen, tangents, lines, force, sums);
   });
 }
 
-void mesh_product(const MeshArrays& mesh, const float* matrix, const float* tangents, const float* x, float* product) {
+void mesh_product(const MeshArrays& mesh, const float* matrix, const float* tangents, const float* x, float* lines,
+                  float* product) {
   constexpr Index kFloats = 2 * kWidth;
-  for (Index i = 0; i < mesh.vertices; ++i) {
-    FloatQuad even{}, odd{};
-    const Index end = mesh.row_starts[i + 1];
-    Index k = mesh.row_starts[i];
-    for (; k + 1 < end; k += 2) {
-      even += load_quad(x + 4 * mesh.columns[k]) * matrix[k];
-      odd += load_quad(x + 4 * mesh.columns[k + 1]) * matrix[k + 1];
-    }
-    if (k < end) even += load_quad(x + 4 * mesh.columns[k]) * matrix[k];
-    store_quad(product + 4 * mesh.rows[i], even + odd);
-  }
   alignas(kAlignment) float H[9 * kMeshLanes];
+  float* const gradients = H;
   for (Index panel = 0; panel < mesh.panels; ++panel) {
-    gather_gradients<kMeshLanes>(mesh, panel * kMeshLanes, x, H);
+    gather_gradients<kMeshLanes, 1>(mesh, panel * kMeshLanes, &x, &gradients);
     for (Index lane = 0; lane < kMeshLanes; lane += kFloats) {
       FloatVec h[9], image[9];
       for (Index i = 0; i < 9; ++i) h[i] = load(H + i * kMeshLanes + lane);
       tangent_product(tangents + panel * kTangentNumbers * kMeshLanes + lane, kMeshLanes, h, image);
       for (Index i = 0; i < 9; ++i) store(H + i * kMeshLanes + lane, image[i]);
     }
-    scatter_stresses<kMeshLanes>(mesh, panel * kMeshLanes, H, product);
+    lanes_to_lines<kMeshLanes>(H, lines + panel * kMeshLanes * kMeshLine);
   }
-}
-
-/// value - sum of numbers times the places at `indices`; kFactorMultiple of them at a time.
-inline FloatQuad less_products(FloatQuad value, const float* numbers, const int* indices, Index count, const float* x) {
-  FloatQuad sums[kFactorMultiple] = {value};
-  for (Index k = 0; k < count; k += kFactorMultiple)
-#pragma GCC unroll 4
-    for (Index i = 0; i < kFactorMultiple; ++i) sums[i] -= load_quad(x + 4 * indices[k + i]) * numbers[k + i];
-  return (sums[0] + sums[1]) + (sums[2] + sums[3]);
-}
-
-void mesh_solve(const MeshFactor& factor, const float* right, float* x) {
-  for (Index i = 0; i < factor.size; ++i) {
-    const Index start = factor.row_starts[i];
-    store_quad(x + 4 * i, less_products(load_quad(right + 4 * i), factor.by_row + start, factor.columns + start,
-                                        factor.row_starts[i + 1] - start, x) *
-                              factor.inverse_diagonal[i]);
-  }
-  for (Index i = factor.size - 1; i >= 0; --i) {
-    const Index start = factor.column_starts[i];
-    store_quad(x + 4 * i, less_products(load_quad(x + 4 * i), factor.by_column + start, factor.rows + start,
-                                        factor.column_starts[i + 1] - start, x) *
-                              factor.inverse_diagonal[i]);
-  }
-}
-
-template <class Lanes, Index vectors, class Number>
-inline void filter_strip(const MeshFilter<Number>& filter, const Number* field, Index first, Number* coefficients) {
-  constexpr Index kNumbers = sizeof(Lanes) / sizeof(Number);
-  Lanes sums[3][vectors] = {};
-  const Number* row = filter.functions + first;
-  for (Index i = 0; i < filter.vertices; ++i, row += filter.stride, field += 4)
-#pragma GCC unroll 2
-    for (Index v = 0; v < vectors; ++v) {
-      const Lanes value = load(row + v * kNumbers);
-#pragma GCC unroll 3
-      for (Index a = 0; a < 3; ++a) sums[a][v] += value * field[a];
+  gather_stresses(mesh, lines, [&](Index row, FloatQuad stresses) {
+    FloatQuad even{}, odd{};
+    const Index end = mesh.row_starts[row + 1];
+    Index k = mesh.row_starts[row];
+    for (; k + 1 < end; k += 2) {
+      even += load_quad(x + 4 * mesh.columns[k]) * matrix[k];
+      odd += load_quad(x + 4 * mesh.columns[k + 1]) * matrix[k + 1];
     }
-  for (Index a = 0; a < 3; ++a)
-    for (Index v = 0; v < vectors; ++v) store(coefficients + a * filter.stride + first + v * kNumbers, sums[a][v]);
+    if (k < end) even += load_quad(x + 4 * mesh.columns[k]) * matrix[k];
+    store_quad(product + 4 * mesh.rows[row], (even + odd) + stresses);
+  });
 }
 
-template <class Lanes, class Number>
+// Blocks of kFactorBlock x kFactorBlock numbers, by rows: groups of rows.
+
+template <class Group>
+constexpr Index kRowGroups = kFactorBlock / kVertices<Group>;
+constexpr Index kFactorNumbers = 4 * kFactorBlock;
+
+template <class Number, class Group>
+inline void load_block(const Number* from, Group* block) {
+  for (Index part = 0; part < kRowGroups<Group>; ++part) block[part] = load_group(from + part * 4 * kVertices<Group>);
+}
+template <class Number, class Group>
+inline void store_block(Number* to, const Group* block) {
+  for (Index part = 0; part < kRowGroups<Group>; ++part) store_group(to + part * 4 * kVertices<Group>, block[part]);
+}
+
+template <class Group>
+inline void repeat_vertices(const Group* x, Group* repeated) {
+  repeated[0] = repeat_vertex<0>(x);
+  repeated[1] = repeat_vertex<1>(x);
+  repeated[2] = repeat_vertex<2>(x);
+  repeated[3] = repeat_vertex<3>(x);
+}
+
+/// image = B x, each vertex of x in all places of a group.
+template <class Number, class Group>
+inline void block_product(const Number* numbers, const Group* x, Group* image) {
+  Group block[kRowGroups<Group>];
+  load_block(numbers, block);
+  for (Index part = 0; part < kRowGroups<Group>; ++part)
+    image[part] = (repeat_number<0>(block[part]) * x[0] + repeat_number<1>(block[part]) * x[1]) +
+                  (repeat_number<2>(block[part]) * x[2] + repeat_number<3>(block[part]) * x[3]);
+}
+
+/// add_vertices() of sums [4] += B^T x.
+template <class Number, class Group>
+inline void add_transposed_product(const Number* numbers, const Number* x, Group* sums) {
+  Group block[kRowGroups<Group>], own[kRowGroups<Group>];
+  load_block(numbers, block);
+  load_block(x, own);
+  for (Index part = 0; part < kRowGroups<Group>; ++part) {
+    sums[0] += repeat_number<0>(block[part]) * own[part];
+    sums[1] += repeat_number<1>(block[part]) * own[part];
+    sums[2] += repeat_number<2>(block[part]) * own[part];
+    sums[3] += repeat_number<3>(block[part]) * own[part];
+  }
+}
+
+float mesh_solve_lower(const MeshFactor& factor, const float* right, float* x) {
+  constexpr Index kGroups = kRowGroups<FloatGroup>;
+  FloatGroup squares[kGroups] = {};
+  std::memcpy(x, right, static_cast<std::size_t>(factor.blocks * kFactorNumbers) * sizeof(float));
+  for (Index column = 0; column < factor.blocks; ++column) {
+    FloatGroup own[kGroups], repeated[kFactorBlock], image[kGroups];
+    load_block(x + column * kFactorNumbers, own);
+    repeat_vertices(own, repeated);
+    block_product(factor.diagonal + 2 * column * kFactorNumbers, repeated, own);
+    store_block(x + column * kFactorNumbers, own);
+    for (Index part = 0; part < kGroups; ++part) squares[part] += own[part] * own[part];
+    repeat_vertices(own, repeated);
+    for (Index k = factor.starts[column]; k < factor.starts[column + 1]; ++k) {
+      float* const below = x + factor.rows[k] * kFactorNumbers;
+      block_product(factor.values + k * kFactorNumbers, repeated, image);
+      load_block(below, own);
+      for (Index part = 0; part < kGroups; ++part) own[part] -= image[part];
+      store_block(below, own);
+    }
+  }
+  float total = 0;
+  for (Index part = 0; part < kGroups; ++part)
+    for (Index i = 0; i < 4 * kVertices<FloatGroup>; ++i) total += squares[part][i];
+  return total;
+}
+
+void mesh_solve_upper(const MeshFactor& factor, float* x) {
+  constexpr Index kGroups = kRowGroups<FloatGroup>;
+  for (Index column = factor.blocks - 1; column >= 0; --column) {
+    FloatGroup sums[4] = {}, image[kGroups], own[kGroups], repeated[kFactorBlock];
+    for (Index k = factor.starts[column]; k < factor.starts[column + 1]; ++k)
+      add_transposed_product(factor.values + k * kFactorNumbers, x + factor.rows[k] * kFactorNumbers, sums);
+    add_vertices(sums, image);
+    load_block(x + column * kFactorNumbers, own);
+    for (Index part = 0; part < kGroups; ++part) own[part] -= image[part];
+    repeat_vertices(own, repeated);
+    block_product(factor.diagonal + (2 * column + 1) * kFactorNumbers, repeated, own);
+    store_block(x + column * kFactorNumbers, own);
+  }
+}
+
+/// Blocks of vertices of a field: its last one may have fewer than kFactorBlock and stands apart.
+template <class Number>
+class BlocksOf {
+ public:
+  BlocksOf(Number* field, Index vertices)
+      : field_(field), whole_(vertices / kFactorBlock), left_(vertices % kFactorBlock) {
+    for (Index i = 0; i < 4 * left_; ++i) last_[i] = field[whole_ * kFactorNumbers + i];
+  }
+  Number* at(Index block) { return block < whole_ ? field_ + block * kFactorNumbers : last_; }
+  void take_back() {
+    for (Index i = 0; i < 4 * left_; ++i) field_[whole_ * kFactorNumbers + i] = last_[i];
+  }
+
+ private:
+  Number* field_;
+  Index whole_, left_;
+  alignas(kAlignment) Number last_[kFactorNumbers] = {};
+};
+
+template <class Number>
 inline void coefficients_of(const MeshFilter<Number>& filter, const Number* field, Number* coefficients) {
-  constexpr Index kNumbers = sizeof(Lanes) / sizeof(Number);
-  Index first = 0;
-  for (; first + 2 * kNumbers <= filter.stride; first += 2 * kNumbers)
-    filter_strip<Lanes, 2>(filter, field, first, coefficients);
-  if (first < filter.stride) filter_strip<Lanes, 1>(filter, field, first, coefficients);
+  using Group = GroupOf<Number>;
+  BlocksOf<Number> blocks(const_cast<Number*>(field), filter.vertices);
+  for (Index column = 0; column < filter.blocks; ++column) {
+    Group sums[4] = {}, own[kRowGroups<Group>];
+    for (Index k = filter.starts[column]; k < filter.starts[column + 1]; ++k)
+      add_transposed_product(filter.values + k * kFactorNumbers, blocks.at(filter.rows[k]), sums);
+    add_vertices(sums, own);
+    store_block(coefficients + column * kFactorNumbers, own);
+  }
 }
 
-template <class Lanes, class Number>
+template <class Number>
 inline void add_functions(const MeshFilter<Number>& filter, Number factor, const Number* coefficients, Number* field) {
-  constexpr Index kNumbers = sizeof(Lanes) / sizeof(Number);
-  alignas(kAlignment) Number lanes[kNumbers < 4 ? 4 : kNumbers] = {};
-  const Number* row = filter.functions;
-  for (Index i = 0; i < filter.vertices; ++i, row += filter.stride, field += 4) {
-    Lanes sums[3] = {};
-    for (Index k = 0; k < filter.stride; k += kNumbers) {
-      const Lanes value = load(row + k);
-#pragma GCC unroll 3
-      for (Index a = 0; a < 3; ++a) sums[a] += value * load(coefficients + a * filter.stride + k);
+  using Group = GroupOf<Number>;
+  constexpr Index kGroups = kRowGroups<Group>;
+  BlocksOf<Number> blocks(field, filter.vertices);
+  for (Index column = 0; column < filter.blocks; ++column) {
+    Group own[kGroups], repeated[kFactorBlock], image[kGroups];
+    load_block(coefficients + column * kFactorNumbers, own);
+    for (Index part = 0; part < kGroups; ++part) own[part] *= factor;
+    repeat_vertices(own, repeated);
+    for (Index k = filter.starts[column]; k < filter.starts[column + 1]; ++k) {
+      Number* const at = blocks.at(filter.rows[k]);
+      block_product(filter.values + k * kFactorNumbers, repeated, image);
+      load_block(at, own);
+      for (Index part = 0; part < kGroups; ++part) own[part] += image[part];
+      store_block(at, own);
     }
-    QuadOf<Number> totals[4] = {};
-#pragma GCC unroll 3
-    for (Index a = 0; a < 3; ++a) {
-      store(lanes, sums[a]);
-      totals[a] = load_quad(lanes);
-      for (Index lane = 4; lane < kNumbers; lane += 4) totals[a] += load_quad(lanes + lane);
-    }
-    transpose(totals);
-    store_quad(field, load_quad(field) + factor * ((totals[0] + totals[1]) + (totals[2] + totals[3])));
   }
+  blocks.take_back();
 }
 
 void mesh_coefficients(const MeshFilter<double>& filter, const double* field, double* coefficients) {
-  coefficients_of<Vec>(filter, field, coefficients);
+  coefficients_of(filter, field, coefficients);
 }
 void mesh_rounded_coefficients(const MeshFilter<float>& filter, const float* field, float* coefficients) {
-  coefficients_of<FloatVec>(filter, field, coefficients);
+  coefficients_of(filter, field, coefficients);
 }
 void mesh_add_functions(const MeshFilter<double>& filter, double factor, const double* coefficients, double* field) {
-  add_functions<Vec>(filter, factor, coefficients, field);
+  add_functions(filter, factor, coefficients, field);
 }
 void mesh_add_rounded_functions(const MeshFilter<float>& filter, float factor, const float* coefficients,
                                 float* field) {
-  add_functions<FloatVec>(filter, factor, coefficients, field);
+  add_functions(filter, factor, coefficients, field);
 }

@@ -295,8 +295,13 @@ void FullBodyStep::set_reduced() noexcept {
     q = &bones.own;
     v = &own.rate;
   }
-  state_.q.noalias() = full.projection.transpose() * *q;
-  state_.v.noalias() = full.projection.transpose() * *v;
+  const auto project = [&](const Eigen::VectorXd& from, Eigen::VectorXd& to) {
+    const Eigen::Index columns = padded(to.size());
+    kernels().matrix_vector(full.projection.data(), columns, from.size(), columns, from.data(), own.modes.data());
+    std::copy_n(own.modes.data(), to.size(), to.data());
+  };
+  project(*q, state_.q);
+  project(*v, state_.v);
   state_.q_previous = state_.q;
   state_.v_previous = state_.v;
   if (full.rigid) model_.frame->adopt(frame, momenta, state_.q, state_.v, workspace_.frame, state_.frame);

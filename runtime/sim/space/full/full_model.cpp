@@ -104,11 +104,9 @@ void append_functions(const RowMatrix& filter, const Eigen::VectorXd& band, cons
 
 void FullModel::set_frame_of_functions() {
   if (!rigid && !carried) return;
-  const MeshFilter<double> filter = space.filter();
-  const Eigen::Map<const RowMatrix> all(filter.functions, filter.vertices, filter.stride);
-  const auto F = all.leftCols(space.functions());
+  const Eigen::MatrixXd& F = space.function_values();
   const Eigen::Matrix4Xd& from_origin = rigid ? rigid->rest() : carried->rest();
-  functions.rest = F.transpose() * from_origin.topLeftCorner(3, filter.vertices).transpose();
+  functions.rest = F.transpose() * from_origin.topLeftCorner(3, F.rows()).transpose();
   functions.ones = F.colwise().sum();
 }
 
@@ -170,8 +168,10 @@ FullModelResult build_full_model(const ReducedModel& reduced, const Model& model
         region_tet_shares(object.mesh, inside, at_all(data.region, &RegionData::window, vertices)));
   }
   full->basis = moving_rows(full->space, reduced.modal->basis);
-  full->projection.resize(full->basis.rows(), full->basis.cols());
-  for (Eigen::Index i = 0; i < model.modes(); ++i) full->projection.col(i) = full->space.momentum(full->basis.col(i));
+  const Eigen::Index columns = padded(model.modes());
+  full->projection = AlignedArray(full->basis.rows() * columns);
+  Eigen::Map<RowMatrix> projection(full->projection.data(), full->basis.rows(), columns);
+  for (Eigen::Index i = 0; i < model.modes(); ++i) projection.col(i) = full->space.momentum(full->basis.col(i));
   return {std::move(full), {}};
 }
 

@@ -78,9 +78,9 @@ struct FullModel {
   /// Sets how coefficients follow the frame, where it moves; once there are examples.
   void set_frame_of_functions();
 
-  VertexArray rest;      ///< n x 3, X of all vertices of the mesh, world [m]
-  RowMatrix basis;       ///< f x r, U of the vertices that move
-  RowMatrix projection;  ///< f x r, M U
+  VertexArray rest;         ///< n x 3, X of all vertices of the mesh, world [m]
+  RowMatrix basis;          ///< f x r, U of the vertices that move
+  AlignedArray projection;  ///< f x padded(r), M U by rows
 };
 
 /// The model, or why there is none, from /object, /modal and, with examples, /full_space; `model` is that of the same

@@ -25,7 +25,8 @@ FullPotentialWorkspace::FullPotentialWorkspace(const FullModel& model)
       force(x),
       frozen(model.space.padded_elements() * kTangentNumbers),
       tangents(model.space.padded_elements() * kTangentNumbers),
-      coefficients(3 * model.space.filter().stride),
+      lines(model.space.padded_elements() * kMeshLine),
+      coefficients(model.space.coefficients()),
       rate_coefficients(coefficients),
       target(Eigen::VectorXd::Zero(3 * model.space.functions())),
       raw(target),
@@ -122,6 +123,7 @@ double FullPotential::undamped_at(const Eigen::VectorXd& d, double elastic_energ
 void FullPotential::evaluate_elements(const Eigen::VectorXd& d, Tangents tangents, bool freeze) noexcept {
   const Eigen::Index size = space_.field_size();
   FullPotentialWorkspace& work = workspace_;
+  coefficients_stand_ = false;
   Field(work.x.data(), size) = work.start + d;
   Field(work.a.data(), size) = work.offset + d;
   Field(work.w.data(), size) = work.rate + d;
@@ -142,12 +144,12 @@ void FullPotential::evaluate_elements(const Eigen::VectorXd& d, Tangents tangent
   run.mesh_inertia(mesh, own, work.inertia.data(), work.force.data(), sums_.data());
   if (tangents == Tangents::kExact) {
     run.mesh_force_and_tangents(mesh, law, example, own, freeze, work.frozen.data(), work.tangents.data(),
-                                work.force.data(), sums_.data());
+                                work.lines.data(), work.force.data(), sums_.data());
   } else {
     if (tangents == Tangents::kProjected)
       space_.projected_tangents(work.x.data(), has_elastic_target_ ? &work.elastic_target : nullptr,
                                 own.stiffness_damping, freeze, work.frozen.data(), work.tangents.data());
-    run.mesh_force(mesh, law, example, own, work.frozen.data(), work.force.data(), sums_.data());
+    run.mesh_force(mesh, law, example, own, work.frozen.data(), work.lines.data(), work.force.data(), sums_.data());
   }
   work_ = work.external.dot(d);
 }
@@ -159,11 +161,9 @@ void FullPotential::set_elastic_target(std::size_t group, const Eigen::VectorXd&
   has_elastic_target_ = true;
 }
 
-FullPotential::Coefficient FullPotential::at(AlignedArray& coefficients, Eigen::Index k) const noexcept {
-  return Coefficient(coefficients.data() + k, Eigen::InnerStride<>(space_.filter().stride));
-}
-
 void FullPotential::set_coefficients() noexcept {
+  if (coefficients_stand_) return;
+  coefficients_stand_ = true;
   const double* field = workspace_.x.data();
   if (model_.skin) {
     model_.skin->to_own(workspace_.skin, field, workspace_.turned.data());
@@ -253,6 +253,7 @@ PotentialEvaluation FullPotential::gradient_there(const Eigen::VectorXd& d, Eige
 void FullPotential::set_filter_coefficients(PotentialValue& total) noexcept {
   FullPotentialWorkspace& work = workspace_;
   set_coefficients();
+  coefficients_stand_ = false;
   if (damps_filtered()) {
     const double* rate = work.w.data();
     if (model_.skin) {

@@ -23,18 +23,20 @@ struct FullPotentialWorkspace {
   explicit FullPotentialWorkspace(const FullModel& model);
 
   Eigen::VectorXd start, offset, rate, external;  ///< fields at d = 0: q_n, q_n - q_a, q_n - q_v, f_ext
-  Eigen::VectorXd frame_rate;                    ///< q - q_v that the frame of a carried body makes, or the bones alone
-  SkinPose skin;                                 ///< pose by the bones at the end of the step, on a skeleton
-  Eigen::VectorXd turned;                        ///< a field in its bones' axes, or of a free body a force
-  Eigen::VectorXd unused;                        ///< a gradient that nobody asked for
-  AlignedArray x, a, w, inertia, force;          ///< fields at the last d
-  AlignedArray frozen;                           ///< tangents of damping, see Kernels::mesh_force()
-  AlignedFloats tangents;                        ///< element tangents for the Hessian
-  AlignedArray coefficients, rate_coefficients;  ///< 3 x stride: F^T q at the last d, F^T (q - q_v); forces on them
-  Eigen::VectorXd target;                        ///< c* of each group [3m] from 3 `first` on
-  Eigen::VectorXd raw, spring, damper;           ///< numbers of one group
-  FullTarget elastic_target;                     ///< targets of elastic example forces
-  RigidWorkspace rigid;                          ///< pose of a free body where freeze() was last called
+  Eigen::VectorXd frame_rate;            ///< q - q_v that the frame of a carried body makes, or the bones alone
+  SkinPose skin;                         ///< pose by the bones at the end of the step, on a skeleton
+  Eigen::VectorXd turned;                ///< a field in its bones' axes, or of a free body a force
+  Eigen::VectorXd unused;                ///< a gradient that nobody asked for
+  AlignedArray x, a, w, inertia, force;  ///< fields at the last d
+  AlignedArray frozen;                   ///< tangents of damping, see Kernels::mesh_force()
+  AlignedFloats tangents;                ///< element tangents for the Hessian
+  AlignedArray lines;                    ///< scratch of the kernels
+  /// F^T q at the last d, F^T (q - q_v), four numbers of each function; forces on them.
+  AlignedArray coefficients, rate_coefficients;
+  Eigen::VectorXd target;               ///< c* of each group [3m] from 3 `first` on
+  Eigen::VectorXd raw, spring, damper;  ///< numbers of one group
+  FullTarget elastic_target;            ///< targets of elastic example forces
+  RigidWorkspace rigid;                 ///< pose of a free body where freeze() was last called
 };
 
 /// Takes off a field [places x 4] what would move what attachments hold, and calls use(attachment, k, taken) with that
@@ -142,8 +144,10 @@ class FullPotential {
   }
   MeshInertia terms() const noexcept;
 
-  using Coefficient = Eigen::Map<Eigen::Vector3d, 0, Eigen::InnerStride<>>;  ///< [3] of one function
-  Coefficient at(AlignedArray& coefficients, Eigen::Index k) const noexcept;
+  /// That of one function.
+  static Eigen::Map<Eigen::Vector3d> at(AlignedArray& coefficients, Eigen::Index k) noexcept {
+    return Eigen::Map<Eigen::Vector3d>(coefficients.data() + 4 * k);
+  }
   void see(const FullExamples& examples, AlignedArray& coefficients, const Eigen::Matrix3d* from,
            Eigen::VectorXd& seen) noexcept;
   void put_force(const FullExamples& examples, Eigen::VectorXd& force, const Eigen::Matrix3d* to,
@@ -171,6 +175,7 @@ class FullPotential {
   std::array<double, kMeshSums> sums_{};
   double work_ = 0, external_norm_ = 0, reach_ = 0;
   bool has_elastic_target_ = false;
+  bool coefficients_stand_ = false;  ///< true where the workspace has those of the last d
 };
 
 }  // namespace exmat::runtime

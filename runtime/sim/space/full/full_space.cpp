@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 #include <set>
+#include <span>
 #include <tuple>
 #include <utility>
 
@@ -37,6 +38,15 @@ std::vector<std::int32_t> by_length(Eigen::Index count, const Length& length) {
 }
 
 using Gradients = Eigen::Matrix<double, 4, 3>;
+
+template <class Number, class Block>
+auto join(const std::vector<Block>& blocks) {
+  std::conditional_t<std::is_same_v<Number, float>, AlignedFloats, AlignedArray> joined(std::ssize(blocks) *
+                                                                                        Block::SizeAtCompileTime);
+  for (std::size_t i = 0; i < blocks.size(); ++i)
+    std::copy_n(blocks[i].data(), Block::SizeAtCompileTime, joined.data() + i * Block::SizeAtCompileTime);
+  return joined;
+}
 
 // Diagonal of (L L^T)^-1, from its entries on the pattern of L alone (Takahashi, Fagan and Chen 1973).
 Eigen::VectorXd diagonal_of_inverse(const Eigen::SparseMatrix<double>& L) {
@@ -72,6 +82,27 @@ Eigen::VectorXd diagonal_of_inverse(const Eigen::SparseMatrix<double>& L) {
 
 }  // namespace
 
+template <class Number>
+FullFilter<Number>::FullFilter(const Eigen::MatrixXd& functions) : vertices_(functions.rows()) {
+  using Block = Eigen::Matrix<Number, kFactorBlock, kFactorBlock, Eigen::RowMajor>;
+  std::vector<Block> blocks;
+  for (Eigen::Index column = 0; column < functions.cols(); column += kFactorBlock) {
+    const Eigen::Index width = std::min(kFactorBlock, functions.cols() - column);
+    for (Eigen::Index row = 0; row < functions.rows(); row += kFactorBlock) {
+      const auto own = functions.block(row, column, std::min(kFactorBlock, functions.rows() - row), width);
+      if (own.isZero(0)) continue;
+      blocks.push_back(Block::Zero());
+      blocks.back().topLeftCorner(own.rows(), width) = own.template cast<Number>();
+      rows_.push_back(static_cast<std::int32_t>(row / kFactorBlock));
+    }
+    starts_.push_back(static_cast<std::int32_t>(rows_.size()));
+  }
+  values_ = join<Number>(blocks);
+}
+
+template class FullFilter<double>;
+template class FullFilter<float>;
+
 FullSpace::FullSpace(const TetMesh& mesh, const TetMaterials& materials, const FlagVector& fixed,
                      const RowMatrix& filter, FixedVertices fixed_vertices)
     : model_(materials.model), clamped_(fixed.any()) {
@@ -105,7 +136,23 @@ void FullSpace::order_vertices(const TetMesh& mesh, const FlagVector& fixed, Fix
   pattern.setFromTriplets(entries.begin(), entries.end());
   Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> order;
   Eigen::AMDOrdering<int>()(pattern, order);
-  vertex_of_.assign(order.indices().data(), order.indices().data() + count);
+  // Blocks of the factor are of vertices that this order has side by side; in the order of their own graph they fill in
+  // less. The last one may have fewer.
+  const Eigen::VectorXi place_of_moving =
+      Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int>(order.inverse()).indices();
+  const Eigen::Index blocks = (count + kFactorBlock - 1) / kFactorBlock;
+  for (Eigen::Triplet<double>& entry : entries)
+    entry = {static_cast<int>(place_of_moving[entry.row()] / kFactorBlock),
+             static_cast<int>(place_of_moving[entry.col()] / kFactorBlock), 1.0};
+  Eigen::SparseMatrix<double> coarse(blocks, blocks);
+  coarse.setFromTriplets(entries.begin(), entries.end());
+  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> block_order;
+  Eigen::AMDOrdering<int>()(coarse, block_order);
+  std::vector<int> in_order(block_order.indices().data(), block_order.indices().data() + blocks);
+  std::ranges::stable_partition(in_order, [&](int block) { return block < count / kFactorBlock; });
+  for (const int block : in_order)
+    for (Eigen::Index k = kFactorBlock * block; k < std::min<Eigen::Index>(count, kFactorBlock * (block + 1)); ++k)
+      vertex_of_.push_back(order.indices()[k]);
   std::vector<std::int32_t> place(static_cast<std::size_t>(count));
   for (std::int32_t k = 0; k < count; ++k) place[static_cast<std::size_t>(vertex_of_[static_cast<std::size_t>(k)])] = k;
   place_of_ = moving;
@@ -188,6 +235,7 @@ void FullSpace::add_elements(const Elements& elements, const TetMaterials& mater
       by_length(elements.count(), [&](std::int32_t i) { return moving(order[static_cast<std::size_t>(i)]); });
   const Eigen::Index padded_count = (elements.count() + kMeshLanes - 1) / kMeshLanes * kMeshLanes;
   mu_ = lambda_ = variance_ = AlignedArray(padded_count);
+  std::vector<std::vector<Corner>> lists(static_cast<std::size_t>(padded_count));
   for (Eigen::Index at = 0; at < elements.count(); ++at) {
     const std::int32_t element = order[static_cast<std::size_t>(within[static_cast<std::size_t>(at)])];
     element_at_.push_back(element);
@@ -195,37 +243,53 @@ void FullSpace::add_elements(const Elements& elements, const TetMaterials& mater
     Eigen::Index row = 0;
     for (const std::int32_t vertex : elements.vertices_of(element)) {
       const std::int32_t place = place_of_[static_cast<std::size_t>(vertex)];
-      if (place >= 0) {
-        corners_.push_back(place);
-        for (int c = 0; c < 3; ++c) gradients_.push_back(gradients(row, c));
-      }
+      if (place >= 0)
+        lists[static_cast<std::size_t>(at)].push_back(
+            {place, {gradients(row, 0), gradients(row, 1), gradients(row, 2)}});
       ++row;
     }
-    starts_.push_back(static_cast<std::int32_t>(corners_.size()));
     const LameParameters lame = elements.lame(element);
     mu_[at] = elements.volumes[element] * lame.mu;
     lambda_[at] = elements.volumes[element] * lame.lambda;
     variance_[at] = elements.smoothed() ? materials.variance_factor * mu_[at] : 0;
   }
-  starts_.resize(static_cast<std::size_t>(padded_count) + 1, starts_.back());
-  rounded_gradients_.assign(gradients_.begin(), gradients_.end());
+  std::vector<std::vector<Corner>> around(static_cast<std::size_t>(places()));
+  for (std::size_t e = 0; e < lists.size(); ++e)
+    for (const Corner& corner : lists[e])
+      around[static_cast<std::size_t>(corner.index)].push_back({static_cast<std::int32_t>(e), corner.gradient});
+  std::vector<std::vector<Corner>> of_rows;
+  for (const std::int32_t row : rows_) of_rows.push_back(around[static_cast<std::size_t>(row)]);
+  elements_ = CornerLists(lists);
+  around_ = CornerLists(of_rows);
+}
+
+CornerLists::CornerLists(const std::vector<std::vector<Corner>>& lists) {
+  for (std::size_t first = 0; first < lists.size(); first += kMeshGroup) {
+    const auto own = std::span(lists).subspan(first, std::min<std::size_t>(kMeshGroup, lists.size() - first));
+    const std::size_t length = std::ranges::max(own, {}, &std::vector<Corner>::size).size();
+    for (std::size_t k = 0; k < length; ++k)
+      for (std::size_t i = 0; i < kMeshGroup; ++i) {
+        const Corner corner = i < own.size() && k < own[i].size() ? own[i][k] : Corner{};
+        indices.push_back(corner.index);
+        gradients.insert(gradients.end(), corner.gradient.begin(), corner.gradient.end());
+      }
+    starts.push_back(starts.back() + static_cast<std::int32_t>(length));
+  }
+  gradients.push_back(0);
+  rounded_gradients.assign(gradients.begin(), gradients.end());
 }
 
 void FullSpace::add_filter(const RowMatrix& filter) {
-  functions_ = filter.cols();
-  stride_ = (functions_ + kMeshLanes - 1) / kMeshLanes * kMeshLanes;
-  filter_ = AlignedArray(vertices() * stride_);
-  for (Eigen::Index v = 0; functions_ > 0 && v < filter.rows(); ++v)
-    if (number(v) >= 0)
-      for (Eigen::Index k = 0; k < functions_; ++k) filter_[place(v) * stride_ + k] = filter(v, k);
+  functions_.setZero(vertices(), filter.cols());
+  for (Eigen::Index v = 0; v < filter.rows(); ++v)
+    if (number(v) >= 0) functions_.row(place(v)) = filter.row(v);
   // A translation of a free body is no deformation: W' = W - (M 1) (1^T W) / m.
-  if (!clamped_ && functions_ > 0) {
-    Eigen::Map<RowMatrix> W(filter_.data(), vertices(), stride_);
+  if (!clamped_ && functions() > 0) {
     const Eigen::VectorXd shares = masses();
-    W -= shares / shares.sum() * W.colwise().sum().eval();
+    functions_ -= shares / shares.sum() * functions_.colwise().sum().eval();
   }
-  rounded_filter_ = AlignedFloats(vertices() * stride_);
-  std::copy_n(filter_.data(), vertices() * stride_, rounded_filter_.data());
+  filter_ = FullFilter<double>(functions_);
+  rounded_filter_ = FullFilter<float>(functions_);
 }
 
 FullSpace::Scalar FullSpace::scalar_matrix(const std::vector<double>& values) const {
@@ -279,10 +343,14 @@ MeshArrays FullSpace::arrays() const noexcept {
   MeshArrays mesh;
   mesh.vertices = places();
   mesh.panels = padded_elements() / kMeshLanes;
-  mesh.starts = starts_.data();
-  mesh.corners = corners_.data();
-  mesh.gradients = gradients_.data();
-  mesh.rounded_gradients = rounded_gradients_.data();
+  mesh.starts = elements_.starts.data();
+  mesh.corners = elements_.indices.data();
+  mesh.gradients = elements_.gradients.data();
+  mesh.rounded_gradients = elements_.rounded_gradients.data();
+  mesh.around_starts = around_.starts.data();
+  mesh.around = around_.indices.data();
+  mesh.gradients_around = around_.gradients.data();
+  mesh.rounded_gradients_around = around_.rounded_gradients.data();
   mesh.variance = variance_.data();
   mesh.rows = rows_.data();
   mesh.row_starts = row_starts_.data();
@@ -338,10 +406,12 @@ ElementLaw FullSpace::law(const FullTarget& target) const noexcept {
 
 Eigen::Matrix3d FullSpace::displacement_gradient(const double* field, Eigen::Index element) const noexcept {
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
-  for (auto k = static_cast<std::size_t>(starts_[static_cast<std::size_t>(element)]);
-       k < static_cast<std::size_t>(starts_[static_cast<std::size_t>(element) + 1]); ++k)
-    H += Eigen::Map<const Eigen::Vector3d>(field + 4 * corners_[k]) *
-         Eigen::Map<const Eigen::RowVector3d>(&gradients_[3 * k]);
+  const auto list = static_cast<std::size_t>(element / kMeshGroup);
+  for (Eigen::Index k = elements_.starts[list]; k < elements_.starts[list + 1]; ++k) {
+    const auto at = static_cast<std::size_t>(k * kMeshGroup + element % kMeshGroup);
+    H += Eigen::Map<const Eigen::Vector3d>(field + 4 * elements_.indices[at]) *
+         Eigen::Map<const Eigen::RowVector3d>(&elements_.gradients[3 * at]);
+  }
   return H;
 }
 
@@ -385,59 +455,71 @@ void FullSpace::projected_tangents(const double* field, const FullTarget* exampl
 
 FullPreconditioner::FullPreconditioner(const FullSpace& space, double mass_factor, double stiffness_factor,
                                        const Eigen::VectorXd& filter_stiffness, bool with_diagonal)
-    : size_(space.vertices()), stride_(space.filter().stride) {
+    : size_(space.vertices()) {
   const Eigen::SparseMatrix<double> matrix =
       mass_factor * space.mass() + stiffness_factor * space.preconditioning_stiffness();
   const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>> factor(matrix);
   const Eigen::SparseMatrix<double> L = factor.matrixL();
-  const Eigen::SparseMatrix<double, Eigen::RowMajor> rows = L;
-  const auto take = [](const auto& matrix_of, std::vector<std::int32_t>& starts, std::vector<std::int32_t>& indices,
-                       std::vector<float>& values) {
-    starts.push_back(0);
-    for (Eigen::Index outer = 0; outer < matrix_of.outerSize(); ++outer) {
-      for (typename std::decay_t<decltype(matrix_of)>::InnerIterator entry(matrix_of, outer); entry; ++entry)
-        if (entry.index() != outer) {
-          indices.push_back(static_cast<std::int32_t>(entry.index()));
-          values.push_back(static_cast<float>(entry.value()));
-        }
-      while ((std::ssize(indices) - starts.back()) % kFactorMultiple != 0) {
-        indices.push_back(0);
-        values.push_back(0);
-      }
-      starts.push_back(static_cast<std::int32_t>(indices.size()));
-    }
-  };
-  take(rows, row_starts_, columns_, by_row_);
-  take(L, column_starts_, rows_, by_column_);
-  for (Eigen::Index i = 0; i < size_; ++i) inverse_diagonal_.push_back(static_cast<float>(1 / L.coeff(i, i)));
+  take_blocks(L);
 
   if (with_diagonal) diagonal_ = diagonal_of_inverse(L);
 
   // Woodbury: S^-1 - Z (1 + V^T Z)^-1 Z^T with V = W k^1/2, Z = S^-1 V, as the square of Z times a root of the inverse.
-  const bool filters = filter_stiffness.size() > 0 && !filter_stiffness.isZero(0);
-  functions_ = AlignedFloats(filters ? size_ * stride_ : 0);
-  if (!filters) return;
-  Eigen::MatrixXd V = Eigen::Map<const RowMatrix>(space.filter().functions, size_, stride_);
-  V.leftCols(filter_stiffness.size()) *= filter_stiffness.cwiseSqrt().asDiagonal();
+  if (filter_stiffness.size() == 0 || filter_stiffness.isZero(0)) return;
+  const Eigen::MatrixXd V = space.function_values() * filter_stiffness.cwiseSqrt().asDiagonal();
   const Eigen::MatrixXd Z = factor.solve(V);
   Eigen::MatrixXd small = V.transpose() * Z;
   small.diagonal().array() += 1;
   const Eigen::MatrixXd root =
-      small.llt().matrixU().solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(stride_, stride_)));
-  Eigen::Map<Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(functions_.data(), size_, stride_) =
-      (Z * root).cast<float>();
+      small.llt().matrixU().solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(V.cols(), V.cols())));
+  functions_ = FullFilter<float>(Z * root);
   if (with_diagonal) diagonal_ -= (Z * root).rowwise().squaredNorm();
 }
 
-void FullPreconditioner::solve(const Kernels& run, const AlignedFloats& right, AlignedFloats& x,
-                               AlignedFloats& coefficients) const noexcept {
-  run.mesh_solve({size_, row_starts_.data(), columns_.data(), column_starts_.data(), rows_.data(), by_row_.data(),
-                  by_column_.data(), inverse_diagonal_.data()},
-                 right.data(), x.data());
-  if (functions_.size() == 0) return;
-  const MeshFilter<float> filter{size_, stride_, functions_.data()};
-  run.mesh_rounded_coefficients(filter, right.data(), coefficients.data());
-  run.mesh_add_rounded_functions(filter, -1, coefficients.data(), x.data());
+void FullPreconditioner::take_blocks(const Eigen::SparseMatrix<double>& L) {
+  using Block = Eigen::Matrix<float, kFactorBlock, kFactorBlock, Eigen::RowMajor>;
+  const Eigen::Index blocks = (size_ + kFactorBlock - 1) / kFactorBlock;
+  std::vector<Block> values, diagonal;
+  std::vector<Eigen::Matrix4d> column(static_cast<std::size_t>(blocks), Eigen::Matrix4d::Zero());
+  for (Eigen::Index own = 0; own < blocks; ++own) {
+    const Eigen::Index begin = kFactorBlock * own, width = std::min(kFactorBlock, size_ - begin);
+    std::set<std::int32_t> found;
+    for (Eigen::Index k = 0; k < width; ++k)
+      for (Eigen::SparseMatrix<double>::InnerIterator entry(L, begin + k); entry; ++entry) {
+        column[static_cast<std::size_t>(entry.index() / kFactorBlock)](entry.index() % kFactorBlock, k) = entry.value();
+        found.insert(static_cast<std::int32_t>(entry.index() / kFactorBlock));
+      }
+    for (const std::int32_t row : found) {
+      Eigen::Matrix4d& block = column[static_cast<std::size_t>(row)];
+      if (row == own) {
+        Eigen::Matrix4d inverse = Eigen::Matrix4d::Zero();
+        inverse.topLeftCorner(width, width) = block.topLeftCorner(width, width).inverse();
+        diagonal.push_back(inverse.cast<float>());
+        diagonal.push_back(inverse.transpose().cast<float>());
+      } else {
+        rows_.push_back(row);
+        values.push_back(block.cast<float>());
+      }
+      block.setZero();
+    }
+    starts_.push_back(static_cast<std::int32_t>(rows_.size()));
+  }
+  values_ = join<float>(values);
+  diagonal_blocks_ = join<float>(diagonal);
+}
+
+float FullPreconditioner::begin_solve(const Kernels& run, const AlignedFloats& right, AlignedFloats& x,
+                                      AlignedFloats& coefficients) const noexcept {
+  float square = run.mesh_solve_lower(factor(), right.data(), x.data());
+  if (functions_.empty()) return square;
+  run.mesh_rounded_coefficients(functions_.arrays(), right.data(), coefficients.data());
+  return square - coefficients.vector().squaredNorm();
+}
+
+void FullPreconditioner::end_solve(const Kernels& run, AlignedFloats& x,
+                                   const AlignedFloats& coefficients) const noexcept {
+  run.mesh_solve_upper(factor(), x.data());
+  if (!functions_.empty()) run.mesh_add_rounded_functions(functions_.arrays(), -1, coefficients.data(), x.data());
 }
 
 }  // namespace exmat::runtime

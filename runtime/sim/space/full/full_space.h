@@ -3,7 +3,9 @@
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
 #include <algorithm>
+#include <array>
 #include <cstdint>
+#include <type_traits>
 #include <vector>
 
 #include "common/core/arrays.h"
@@ -28,6 +30,42 @@ class AlignedFloats {
  private:
   AlignedArray numbers_;
   Eigen::Index size_ = 0;
+};
+
+/// A corner of an element, or an element that has some vertex as a corner: its number and gradient [1/m] there.
+struct Corner {
+  std::int32_t index = 0;
+  std::array<double, 3> gradient{};
+};
+
+/// Lists of them as the kernels take them, see MeshArrays.
+struct CornerLists {
+  CornerLists() = default;
+  explicit CornerLists(const std::vector<std::vector<Corner>>& lists);
+
+  std::vector<std::int32_t> starts{0}, indices;
+  std::vector<double> gradients;
+  std::vector<float> rounded_gradients;
+};
+
+/// Functions as the kernels take them, of a matrix [n x m]; immutable.
+template <class Number>
+class FullFilter {
+ public:
+  FullFilter() = default;
+  explicit FullFilter(const Eigen::MatrixXd& functions);
+
+  MeshFilter<Number> arrays() const noexcept {
+    return {vertices_, std::ssize(starts_) - 1, starts_.data(), rows_.data(), values_.data()};
+  }
+  /// Of the coefficients.
+  Eigen::Index numbers() const { return 4 * kFactorBlock * (std::ssize(starts_) - 1); }
+  bool empty() const { return values_.size() == 0; }
+
+ private:
+  Eigen::Index vertices_ = 0;
+  std::vector<std::int32_t> starts_{0}, rows_;
+  std::conditional_t<std::is_same_v<Number, float>, AlignedFloats, AlignedArray> values_;
 };
 
 /// Targets of elastic example forces in the elements, one for each group of examples, as their law takes them; sized
@@ -66,12 +104,12 @@ class FullSpace {
   Eigen::Index driven() const { return driven_; }                   ///< p, where they have places in fields
   Eigen::Index places() const { return vertices() + driven_; }
   Eigen::Index field_size() const { return 4 * places(); }
-  Eigen::Index functions() const { return functions_; }  ///< M
-  bool is_clamped() const { return clamped_; }           ///< true if a vertex is fixed
-  double edge() const { return edge_; }                  ///< mean length of the edges [m]
-  double wave_rate() const { return wave_rate_; }        ///< edges a second that the fastest waves pass [1/s]
-  double extent() const { return extent_; }              ///< largest coordinate at rest [m]
-  double stiffness() const { return stiffness_; }        ///< norm of those of the vertices, about [N/m]
+  Eigen::Index functions() const { return functions_.cols(); }  ///< M
+  bool is_clamped() const { return clamped_; }                  ///< true if a vertex is fixed
+  double edge() const { return edge_; }                         ///< mean length of the edges [m]
+  double wave_rate() const { return wave_rate_; }               ///< edges a second that the fastest waves pass [1/s]
+  double extent() const { return extent_; }                     ///< largest coordinate at rest [m]
+  double stiffness() const { return stiffness_; }               ///< norm of those of the vertices, about [N/m]
   double shear_energy() const { return shear_energy_; }  ///< integral of mu: elastic energies at strains about 1 [J]
   const Eigen::Matrix<double, Eigen::Dynamic, 3>& gravity_load() const { return gravity_load_; }  ///< f x 3 [kg]
   /// Place in fields of a vertex of the mesh, -1 where it has none, and its number among those that move, -1 where it
@@ -113,9 +151,11 @@ class FullSpace {
   Eigen::VectorXd element_means(const TetMesh& mesh, const TetMaterials& materials,
                                 const Eigen::VectorXd& values) const;
   ElementLaw law(const FullTarget& target) const noexcept;
-  MeshFilter<double> filter() const noexcept { return {vertices(), stride_, filter_.data()}; }
-  MeshFilter<float> rounded_filter() const noexcept { return {vertices(), stride_, rounded_filter_.data()}; }
-  Eigen::Index padded_elements() const { return std::ssize(starts_) - 1; }
+  MeshFilter<double> filter() const noexcept { return filter_.arrays(); }
+  MeshFilter<float> rounded_filter() const noexcept { return rounded_filter_.arrays(); }
+  Eigen::Index coefficients() const { return filter_.numbers(); }        ///< numbers of the functions' coefficients
+  const Eigen::MatrixXd& function_values() const { return functions_; }  ///< n x M, vertices in the order of fields
+  Eigen::Index padded_elements() const { return kMeshGroup * (std::ssize(elements_.starts) - 1); }
 
   /// [panels x 45 x kMeshLanes] tangents at x as those of Kernels::mesh_force_and_tangents(), their negative
   /// eigenvalues set to zero before the variance is taken off. `example`: null, or the target of an elastic force.
@@ -149,15 +189,13 @@ class FullSpace {
   Eigen::Index driven_ = 0;
   Eigen::Matrix<double, Eigen::Dynamic, 3> gravity_load_;
   std::vector<std::int32_t> element_at_;  ///< of Elements, at each place in the panels
-  std::vector<std::int32_t> starts_{0}, corners_;
-  std::vector<double> gradients_;
-  std::vector<float> rounded_gradients_;
-  AlignedArray mu_, lambda_, variance_;  ///< times the volumes
+  CornerLists elements_, around_;         ///< corners of each element; elements about the vertex of each row
+  AlignedArray mu_, lambda_, variance_;   ///< times the volumes
   std::vector<std::int32_t> rows_, row_starts_{0}, columns_;
   std::vector<double> mass_, variance_matrix_, laplacian_;
-  Eigen::Index functions_ = 0, stride_ = 0;
-  AlignedArray filter_;
-  AlignedFloats rounded_filter_;
+  Eigen::MatrixXd functions_;
+  FullFilter<double> filter_;
+  FullFilter<float> rounded_filter_;
 };
 
 template <typename Driven>
@@ -178,19 +216,32 @@ class FullPreconditioner {
   FullPreconditioner(const FullSpace& space, double mass_factor, double stiffness_factor,
                      const Eigen::VectorXd& filter_stiffness, bool with_diagonal = false);
 
-  /// x = (S (x) I3)^-1 right, fields; coefficients: 3 x stride of the filter.
+  /// x = (S (x) I3)^-1 right, fields; coefficients: those of the filter.
   void solve(const Kernels& run, const AlignedFloats& right, AlignedFloats& x,
-             AlignedFloats& coefficients) const noexcept;
+             AlignedFloats& coefficients) const noexcept {
+    begin_solve(run, right, x, coefficients);
+    end_solve(run, x, coefficients);
+  }
+  /// Half of that: returns right . (S (x) I3)^-1 right. end_solve() takes x and coefficients from there to the
+  /// solution.
+  float begin_solve(const Kernels& run, const AlignedFloats& right, AlignedFloats& x,
+                    AlignedFloats& coefficients) const noexcept;
+  void end_solve(const Kernels& run, AlignedFloats& x, const AlignedFloats& coefficients) const noexcept;
 
   /// [n] of S^-1 [m/N], if asked for.
   const Eigen::VectorXd& inverse_diagonal() const { return diagonal_; }
 
  private:
-  Eigen::Index size_ = 0, stride_ = 0;
+  void take_blocks(const Eigen::SparseMatrix<double>& L);
+  MeshFactor factor() const noexcept {
+    return {std::ssize(starts_) - 1, starts_.data(), rows_.data(), values_.data(), diagonal_blocks_.data()};
+  }
+
+  Eigen::Index size_ = 0;
   Eigen::VectorXd diagonal_;
-  std::vector<std::int32_t> row_starts_, columns_, column_starts_, rows_;
-  std::vector<float> by_row_, by_column_, inverse_diagonal_;
-  AlignedFloats functions_;  ///< the filter's part, subtracted as a square
+  std::vector<std::int32_t> starts_{0}, rows_;
+  AlignedFloats values_, diagonal_blocks_;
+  FullFilter<float> functions_;  ///< the filter's part, subtracted as a square
 };
 
 }  // namespace exmat::runtime

@@ -12,6 +12,7 @@ constexpr double kMostPredicted = 0.5;  // of an edge, that an unchecked predict
 constexpr double kSlow = 0.1;           // of the residual: tangents that leave more are evaluated again
 constexpr int kFarFromFrozen = 12;      // iterations after which the frame of a free body goes along with it
 constexpr int kContactIterations = 60;  // of conjugate gradients near obstacles, at most
+constexpr double kWeakFilter = 0.25;    // of the mass's share, that the preconditioner does without
 constexpr double kLongStep = 0.008;     // [s]
 constexpr double kDelicate = 0.1;       // of the accuracy, in long steps and without damping of stiffness
 constexpr FullAccuracy kResponse{1e-5, 300, 0};
@@ -60,6 +61,8 @@ FullWorkspace::Linear make_linear(const FullModel& model, const FullWorkspace::K
     of_functions.segment(examples.first, examples.functions).setConstant(filter);
   }
   linear.is_filtered = !of_functions.isZero(0);
+  // Beside the mass a weak filter changes no more than what conjugate gradients do anyway.
+  if (of_functions.size() > 0 && of_functions.maxCoeff() <= kWeakFilter * mass) of_functions.setZero();
   linear.preconditioner = FullPreconditioner(space, mass, stiffness + elasticity, of_functions, touches);
   for (Eigen::Index k = 0; k < space.entries(); ++k)
     linear.matrix.push_back(static_cast<float>(mass * space.mass_value(k) + stiffness * space.variance_value(k)));
@@ -120,10 +123,11 @@ FullWorkspace::FullWorkspace(const FullModel& model, const StepScene& scene, con
       search(residual),
       image(residual),
       sum(residual),
-      coefficients(3 * model.space.filter().stride),
+      coefficients(model.space.coefficients()),
       scaled(residual),
       turned(model.skin ? residual.size() : 0),
-      field(d) {
+      field(d),
+      modes(model.basis.cols()) {
   fit(model, scene);
   for (const FullExamples& of_model : model.examples) {
     Examples& own = examples.emplace_back();
@@ -372,31 +376,38 @@ void FullStep::see_coefficients() noexcept {
     potential_.see(model_.examples[group], workspace_.examples[group].coefficients);
 }
 
-// Sets solved = B residual; with contacts B = C S^-1 C, C = (I + z K)^-1/2 at each vertex that touches: exact of a
-// single one.
 void FullStep::precondition() noexcept {
-  precondition_freely();
-  project_held(space_, memory_.attachments, workspace_.solved.data());
+  begin_preconditioning();
+  end_preconditioning();
 }
 
-void FullStep::precondition_freely() noexcept {
+// Towards solved = B residual; returns residual . B residual. With contacts B = C S^-1 C, C = (I + z K)^-1/2 at each
+// vertex that touches: exact of a single one.
+float FullStep::begin_preconditioning() noexcept {
   FullWorkspace& work = workspace_;
   const Kernels& run = kernels();
   const bool turns = model_.skin && linear_->is_filtered;
   if (work.contact.block_count == 0 && !turns)
-    return linear_->preconditioner.solve(run, work.residual, work.solved, work.coefficients);
-  const auto blocks = std::span(work.contact.blocks).first(work.contact.block_count);
+    return linear_->preconditioner.begin_solve(run, work.residual, work.solved, work.coefficients);
   work.scaled.vector() = work.residual.vector();
-  for (const auto& block : blocks) {
-    auto own = work.scaled.vector().segment<3>(4 * block.place);
-    own = (block.scale * own).eval();
-  }
+  scale_blocks(work.scaled);
   // The filter is that of the displacement in the axes of the bones.
   if (turns) model_.skin->turn_back(work.potential.skin, work.scaled.data(), work.scaled.data());
-  linear_->preconditioner.solve(run, work.scaled, work.solved, work.coefficients);
-  if (turns) model_.skin->turn(work.potential.skin, work.solved.data(), work.solved.data());
-  for (const auto& block : blocks) {
-    auto own = work.solved.vector().segment<3>(4 * block.place);
+  return linear_->preconditioner.begin_solve(run, work.scaled, work.solved, work.coefficients);
+}
+
+void FullStep::end_preconditioning() noexcept {
+  FullWorkspace& work = workspace_;
+  linear_->preconditioner.end_solve(kernels(), work.solved, work.coefficients);
+  if (model_.skin && linear_->is_filtered)
+    model_.skin->turn(work.potential.skin, work.solved.data(), work.solved.data());
+  scale_blocks(work.solved);
+  project_held(space_, memory_.attachments, work.solved.data());
+}
+
+void FullStep::scale_blocks(AlignedFloats& field) noexcept {
+  for (const auto& block : std::span(workspace_.contact.blocks).first(workspace_.contact.block_count)) {
+    auto own = field.vector().segment<3>(4 * block.place);
     own = (block.scale * own).eval();
   }
 }
@@ -424,8 +435,7 @@ void FullStep::hold(Eigen::VectorXd& d) const noexcept {
 
 // Turns F^T x into the forces of the filters on it.
 void FullStep::filter_coefficients() noexcept {
-  const Eigen::Index stride = space_.filter().stride;
-  Eigen::Map<Eigen::Matrix<float, 3, Eigen::Dynamic, Eigen::RowMajor>> all(workspace_.coefficients.data(), 3, stride);
+  Eigen::Map<Eigen::Matrix4Xf> all(workspace_.coefficients.data(), 4, space_.coefficients() / 4);
   Eigen::Matrix3f to_world = Eigen::Matrix3f::Identity();
   if (potential_.has_moving_frame()) to_world = potential_.frame_rotation().cast<float>();
   for (const FullWorkspace::Filter& filter : linear_->filters) {
@@ -436,14 +446,14 @@ void FullStep::filter_coefficients() noexcept {
     }
     Eigen::Map<Eigen::Matrix3Xf> numbers(workspace_.of_group.data(), 3, filter.columns);
     Eigen::Map<Eigen::Matrix3Xf> forces(workspace_.of_group.data() + numbers.size(), 3, filter.columns);
-    numbers = own;
+    numbers = own.topRows<3>();
     if (potential_.has_moving_frame())
       for (Eigen::Index k = 0; k < filter.columns; ++k) numbers.col(k) = (to_world.transpose() * numbers.col(k)).eval();
     Eigen::Map<Eigen::VectorXf>(forces.data(), forces.size()).noalias() =
         filter.product * Eigen::Map<const Eigen::VectorXf>(numbers.data(), numbers.size());
     if (potential_.has_moving_frame())
       for (Eigen::Index k = 0; k < filter.columns; ++k) forces.col(k) = (to_world * forces.col(k)).eval();
-    own = forces;
+    own.topRows<3>() = forces;
   }
 }
 
@@ -452,7 +462,7 @@ void FullStep::multiply() noexcept {
   const Kernels& run = kernels();
   FullWorkspace& work = workspace_;
   run.mesh_product(space_.arrays(), linear_->matrix.data(), work.potential.tangents.data(), work.search.data(),
-                   work.image.data());
+                   reinterpret_cast<float*>(work.potential.lines.data()), work.image.data());
   if (linear_->is_filtered) {
     const MeshFilter<float> filter = space_.rounded_filter();
     if (model_.skin) {
@@ -493,10 +503,10 @@ FullStep::Outcome FullStep::find_direction(double tolerance, int most_iterations
   set_scales();
   const double size = work.gradient.norm();
   residual = (work.gradient * (-1 / size)).cast<float>();
-  precondition();
+  float square = begin_preconditioning();
+  end_preconditioning();
   search = solved;
   sum.setZero();
-  float square = residual.dot(solved);
   const float limit = static_cast<float>(tolerance * tolerance) * square;
   for (int iteration = 1;; ++iteration) {
     multiply();
@@ -511,9 +521,9 @@ FullStep::Outcome FullStep::find_direction(double tolerance, int most_iterations
     sum += length * search;
     if (iteration >= most_iterations) break;
     residual -= length * image;
-    precondition();
-    const float next = residual.dot(solved);
+    const float next = begin_preconditioning();
     if (!(next > limit)) break;
+    end_preconditioning();
     search = solved + next / square * search;
     square = next;
   }

@@ -79,6 +79,7 @@ struct FullWorkspace {
   AlignedFloats turned;                                              ///< in the axes of bones, where there are some
   FullContactScratch contact;
   Eigen::VectorXd field;     ///< a field
+  AlignedArray modes;        ///< padded(r)
   Eigen::VectorXf of_group;  ///< coefficients of a group, and forces on them
   struct Examples {
     TargetTable::Workspace table;
@@ -187,7 +188,9 @@ class FullStep {
                     Eigen::VectorXd& own) const noexcept;
   void carry(Eigen::VectorXd& d) const noexcept;
   bool find_contacts(double pushed) noexcept;
-  void precondition_freely() noexcept;
+  float begin_preconditioning() noexcept;
+  void end_preconditioning() noexcept;
+  void scale_blocks(AlignedFloats& field) noexcept;
   void filter_coefficients() noexcept;
   void hold(Eigen::VectorXd& d) const noexcept;
   void end_attachments() noexcept;

@@ -62,9 +62,11 @@ struct Potential {
                                           stiffness * bar.space.variance_value(k)));
     const Eigen::VectorXf rounded = x.cast<float>();
     Eigen::VectorXf image(x.size());
-    kernels().mesh_product(bar.space.arrays(), matrix.data(), workspace.tangents.data(), rounded.data(), image.data());
+    AlignedFloats lines(bar.space.padded_elements() * kMeshLine);
+    kernels().mesh_product(bar.space.arrays(), matrix.data(), workspace.tangents.data(), rounded.data(), lines.data(),
+                           image.data());
     if (with_matrices && !scene.examples.empty()) {
-      Eigen::VectorXf coefficients(3 * bar.space.filter().stride);
+      AlignedFloats coefficients(bar.space.coefficients());
       const auto stiffness_of_filter =
           static_cast<float>(linear_stiffness(scene.examples.front()) + 3 * form.velocity_factor);
       kernels().mesh_rounded_coefficients(bar.space.rounded_filter(), rounded.data(), coefficients.data());
@@ -195,11 +197,13 @@ TEST(FullPotentialTest, InstructionSetsAgree) {
       Eigen::VectorXd inertia(space.field_size()), force(inertia), sums(kMeshSums);
       run->mesh_inertia(space.arrays(), terms, inertia.data(), force.data(), sums.data());
       run->mesh_force_and_tangents(space.arrays(), space.law(), nullptr, terms, true, of.workspace.frozen.data(),
-                                   of.workspace.tangents.data(), force.data(), sums.data());
+                                   of.workspace.tangents.data(), of.workspace.lines.data(), force.data(), sums.data());
       const std::vector<float> none(static_cast<std::size_t>(space.entries()), 0);
       const Eigen::VectorXf x = of.direction.cast<float>();
       Eigen::VectorXf image(x.size()), solution(x.size());
-      run->mesh_product(space.arrays(), none.data(), of.workspace.tangents.data(), x.data(), image.data());
+      AlignedFloats lines(space.padded_elements() * kMeshLine);
+      run->mesh_product(space.arrays(), none.data(), of.workspace.tangents.data(), x.data(), lines.data(),
+                        image.data());
       if (expected.size() == 0) {
         expected = force;
         expected_sums = sums;
@@ -216,12 +220,12 @@ TEST(FullPreconditionerTest, SolvesWithTheScalarMatrixAndTheFilter) {
   const FullBar bar({.two_parts = true, .functions = 5});
   const FullSpace& space = bar.space;
   const FullPreconditioner preconditioner(space, 1e5, 3, Eigen::VectorXd::Constant(5, 700));
-  const RowMatrix W = Eigen::Map<const RowMatrix>(space.filter().functions, space.vertices(), space.filter().stride);
+  const Eigen::MatrixXd& W = space.function_values();
   const Eigen::MatrixXd S =
       Eigen::MatrixXd(1e5 * space.mass() + 3 * space.preconditioning_stiffness()) + 700 * W * W.transpose();
   for (const Kernels* run : available()) {
     SCOPED_TRACE(run->name);
-    AlignedFloats right(space.field_size()), x(right), coefficients(3 * space.filter().stride);
+    AlignedFloats right(space.field_size()), x(right), coefficients(space.coefficients());
     right.vector() = space.to_field(test::random_vector(space.size(), 1)).cast<float>();
     preconditioner.solve(*run, right, x, coefficients);
     const auto columns = [](const AlignedFloats& field) {

@@ -256,9 +256,9 @@ TEST(FullStepTest, ExampleForcePullsTowardsItsTarget) {
     one.solve();
     ASSERT_EQ(one.finish().status, 0U);
   }
-  Eigen::VectorXd coefficients(3 * bar.space.filter().stride);
+  Eigen::VectorXd coefficients(bar.space.coefficients());
   kernels().mesh_coefficients(bar.space.filter(), bar.space.to_field(state.q).data(), coefficients.data());
-  const auto found = coefficients.reshaped(bar.space.filter().stride, 3).topRows(3);
+  const Eigen::MatrixXd found = coefficients.reshaped(4, bar.space.coefficients() / 4).topLeftCorner(3, 3).transpose();
   EXPECT_LE((found - target).norm(), 0.01 * target.norm());
 }
 
@@ -376,7 +376,7 @@ TEST(FullPreconditionerTest, DiagonalOfTheInverseAndComplianceAreThoseOfTheMatri
     const FullPreconditioner preconditioner(bar.space, mass, stiffness, Eigen::VectorXd::Constant(functions, filter),
                                             true);
     Eigen::MatrixXd S = mass * Eigen::MatrixXd(bar.space.mass()) + stiffness * bar.space.preconditioning_stiffness();
-    const Eigen::Map<const RowMatrix> W(bar.space.filter().functions, S.rows(), bar.space.filter().stride);
+    const Eigen::MatrixXd& W = bar.space.function_values();
     if (functions > 0) S += filter * W * W.transpose();
     const Eigen::MatrixXd inverse = S.inverse();
     EXPECT_LE((preconditioner.inverse_diagonal() - inverse.diagonal()).norm(), 1e-9 * inverse.diagonal().norm());
