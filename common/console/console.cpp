@@ -29,6 +29,7 @@ namespace {
 
 // Shorter stages pass without a line.
 constexpr double kQuietSeconds = 2.0;
+constexpr int kMostThreads = 4096;
 
 spdlog::level::level_enum spdlog_level(log::Level level) {
   switch (level) {
@@ -199,7 +200,7 @@ void add_common_options(CLI::App& app, CommonOptions& options) {
   app.footer("Every command also takes --version, --threads, --log-level and --progress: see " + app.get_name() +
              " --help.");
   app.add_option("--threads", options.threads, "OpenMP threads; 0: all cores. Results do not depend on it")
-      ->check(whole_number_between(0, 4096))
+      ->check(whole_number_between(0, kMostThreads))
       ->capture_default_str();
   app.add_option("--log-level", options.log_level, "debug, info, warning or error")
       ->check(CLI::IsMember({"debug", "info", "warning", "error"}))
@@ -216,7 +217,16 @@ void apply(const CommonOptions& options) {
   log::set_sink(
       [logger](log::Level level, std::string_view message) { logger->log(spdlog_level(level), printable(message)); });
   set_progress_sink(make_progress_sink(options.progress));
-  if (options.threads > 0) omp_set_num_threads(options.threads);
+  if (options.threads > 0)
+    omp_set_num_threads(options.threads);
+  else if (omp_get_max_threads() > kMostThreads)
+    throw InputError({"OMP_NUM_THREADS", "", fmt::format("at most {} threads", kMostThreads),
+                      std::to_string(omp_get_max_threads()), ""});
+  const char* const set = std::getenv("EXMAT_SIMD");
+  if (set != nullptr && std::string_view(set) != "portable" && std::string_view(set) != "avx2" &&
+      std::string_view(set) != "avx512")
+    throw InputError(
+        {"EXMAT_SIMD", "", "portable, avx2 or avx512", set, "leave it out for the fastest of this machine"});
 }
 
 int run_program(CLI::App& app, int argc, char** argv, const std::function<void()>& action) {

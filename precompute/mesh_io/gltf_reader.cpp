@@ -245,7 +245,10 @@ void GltfReader::add_bones(const Instance& instance, const tinygltf::Primitive& 
   for (int set = 0; instance.skin >= 0; ++set) {
     const auto joints = primitive.attributes.find(fmt::format("JOINTS_{}", set));
     const auto weights = primitive.attributes.find(fmt::format("WEIGHTS_{}", set));
-    if (joints == primitive.attributes.end() || weights == primitive.attributes.end()) break;
+    if (joints == primitive.attributes.end()) break;
+    const std::string name = fmt::format("{}/attributes/WEIGHTS_{}", place, set);
+    if (weights == primitive.attributes.end())
+      fail_in_gltf(file_, name, fmt::format("weights, as there is JOINTS_{}", set), "none");
     const RowMatrix numbers =
         accessors_.read_rows(matching(joints->second, count), TINYGLTF_TYPE_VEC4, "VEC4, of joints");
     const RowMatrix shares =
@@ -253,7 +256,8 @@ void GltfReader::add_bones(const Instance& instance, const tinygltf::Primitive& 
     for (std::size_t v = 0; v < count; ++v)
       for (Eigen::Index k = 0; k < 4; ++k) {
         const double share = shares(static_cast<Eigen::Index>(v), k);
-        if (!(share > 0)) continue;
+        if (!(share >= 0)) fail_in_gltf(file_, name, "weights of at least 0", fmt::format("{:g}", share));
+        if (share == 0) continue;
         const auto joint = static_cast<std::size_t>(std::max(0.0, numbers(static_cast<Eigen::Index>(v), k)));
         if (joint >= skeleton_.joints(instance.skin))
           fail_in_gltf(file_, fmt::format("{}/attributes/JOINTS_{}", place, set),
@@ -261,6 +265,10 @@ void GltfReader::add_bones(const Instance& instance, const tinygltf::Primitive& 
         bones_[first + v][skeleton_.bone(instance.skin, joint)] += share;
       }
   }
+  const auto hangs = [](const auto& own) { return !own.empty(); };
+  if (instance.skin >= 0 && primitive.attributes.contains("JOINTS_0") &&
+      std::none_of(bones_.begin() + static_cast<std::ptrdiff_t>(first), bones_.end(), hangs))
+    fail_in_gltf(file_, place + "/attributes/WEIGHTS_0", "weights above 0", "0 of all vertices");
   for (std::size_t v = first; v < bones_.size(); ++v) {
     double sum = 0;
     for (const auto& [bone, share] : bones_[v]) sum += share;

@@ -82,6 +82,14 @@ class Outputs(unittest.TestCase):
         self.assertEqual([path.name for path in self.out.iterdir()], ["bundle.h5"])
         self.check_sound()
 
+    def test_an_environment_that_cannot_be_is_said(self):
+        for name, value in (("OMP_NUM_THREADS", "100000"), ("EXMAT_SIMD", "AVX2"), ("EXMAT_SIMD", "")):
+            run = subprocess.run([PRECOMPUTE, "bundle", self.folder / "asset.json", "-o", self.bundle], env={**os.environ, name: value},
+                                 capture_output=True, text=True, timeout=60)
+            self.assertEqual(run.returncode, 2, run.stderr)
+            self.assertIn(name, run.stderr)
+            self.assertFalse(self.bundle.exists())
+
     def test_two_at_once_leave_one_whole_bundle(self):
         other = json.loads((self.folder / "asset.json").read_text())
         other["seed"] = 2

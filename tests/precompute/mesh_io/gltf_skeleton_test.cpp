@@ -170,6 +170,22 @@ TEST_F(GltfBones, AreRefusedInWords) {
             "at least one joint"},
            {"a joint beyond the last", [](W& w) { w.json["skins"][0]["joints"] = {2}; },
             "/meshes/0/primitives/0/attributes/JOINTS_0", "joints below 1"},
+           {"joints without weights",
+            [](W& w) { w.json["meshes"][0]["primitives"][0]["attributes"].erase("WEIGHTS_0"); },
+            "/meshes/0/primitives/0/attributes/WEIGHTS_0", "as there is JOINTS_0"},
+           {"weights below 0",
+            [](W& w) {
+              std::vector<double> weights(16, 0.5);
+              weights[5] = -1;
+              w.json["meshes"][0]["primitives"][0]["attributes"]["WEIGHTS_0"] = w.accessor(kFloat, "VEC4", weights);
+            },
+            "/meshes/0/primitives/0/attributes/WEIGHTS_0", "weights of at least 0"},
+           {"no weight at all",
+            [](W& w) {
+              w.json["meshes"][0]["primitives"][0]["attributes"]["WEIGHTS_0"] =
+                  w.accessor(kFloat, "VEC4", std::vector<double>(16, 0.0));
+            },
+            "/meshes/0/primitives/0/attributes/WEIGHTS_0", "weights above 0"},
            {"flat matrices",
             [](W& w) {
               w.json["skins"][0]["inverseBindMatrices"] = w.accessor(kFloat, "MAT4", std::vector<double>(32, 0.0));

@@ -9,6 +9,8 @@ namespace {
 
 using Field = Eigen::Map<Eigen::VectorXd>;
 
+constexpr double kFar = 1000;  // of the extent
+
 }  // namespace
 
 FullPotentialWorkspace::FullPotentialWorkspace(const FullModel& model)
@@ -23,6 +25,7 @@ FullPotentialWorkspace::FullPotentialWorkspace(const FullModel& model)
       w(x),
       inertia(x),
       force(x),
+      beside(x),
       frozen(model.space.padded_elements() * kTangentNumbers),
       tangents(model.space.padded_elements() * kTangentNumbers),
       lines(model.space.padded_elements() * kMeshLine),
@@ -52,7 +55,7 @@ void FullPotential::begin(const Eigen::VectorXd& q, const Eigen::VectorXd& exter
 }
 
 MeshInertia FullPotential::terms() const noexcept {
-  return {workspace_.x.data(),
+  return {elements_at_,
           workspace_.a.data(),
           workspace_.w.data(),
           form_.acceleration_factor,
@@ -120,6 +123,17 @@ double FullPotential::undamped_at(const Eigen::VectorXd& d, double elastic_energ
   return sums[0] + elastic_energy - workspace_.external.dot(d);
 }
 
+// x, or far from the origin x less the displacement of a vertex: elements see differences alone, and products with the
+// variance would lose their digits.
+const double* FullPotential::near_field() noexcept {
+  FullPotentialWorkspace& work = workspace_;
+  const bool may_go = !space_.is_clamped() || model_.is_driven();
+  if (!may_go || reach_ <= kFar * space_.extent()) return work.x.data();
+  const Eigen::Map<const Eigen::Matrix4Xd> x(work.x.data(), 4, space_.places());
+  Eigen::Map<Eigen::Matrix4Xd>(work.beside.data(), 4, space_.places()) = x.colwise() - Eigen::Vector4d(x.col(0));
+  return work.beside.data();
+}
+
 void FullPotential::evaluate_elements(const Eigen::VectorXd& d, Tangents tangents, bool freeze) noexcept {
   const Eigen::Index size = space_.field_size();
   FullPotentialWorkspace& work = workspace_;
@@ -139,6 +153,7 @@ void FullPotential::evaluate_elements(const Eigen::VectorXd& d, Tangents tangent
   const MeshArrays mesh = space_.arrays();
   const ElementLaw law = space_.law(), pulled = has_elastic_target_ ? space_.law(work.elastic_target) : law;
   const ElementLaw* const example = has_elastic_target_ ? &pulled : nullptr;
+  elements_at_ = near_field();
   const MeshInertia own = terms();
   const Kernels& run = kernels();
   run.mesh_inertia(mesh, own, work.inertia.data(), work.force.data(), sums_.data());
@@ -147,7 +162,7 @@ void FullPotential::evaluate_elements(const Eigen::VectorXd& d, Tangents tangent
                                 work.lines.data(), work.force.data(), sums_.data());
   } else {
     if (tangents == Tangents::kProjected)
-      space_.projected_tangents(work.x.data(), has_elastic_target_ ? &work.elastic_target : nullptr,
+      space_.projected_tangents(elements_at_, has_elastic_target_ ? &work.elastic_target : nullptr,
                                 own.stiffness_damping, freeze, work.frozen.data(), work.tangents.data());
     run.mesh_force(mesh, law, example, own, work.frozen.data(), work.lines.data(), work.force.data(), sums_.data());
   }

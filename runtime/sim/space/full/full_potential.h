@@ -28,6 +28,7 @@ struct FullPotentialWorkspace {
   Eigen::VectorXd turned;                ///< a field in its bones' axes, or of a free body a force
   Eigen::VectorXd unused;                ///< a gradient that nobody asked for
   AlignedArray x, a, w, inertia, force;  ///< fields at the last d
+  AlignedArray beside;                   ///< x less that of a vertex, where that is far
   AlignedArray frozen;                   ///< tangents of damping, see Kernels::mesh_force()
   AlignedFloats tangents;                ///< element tangents for the Hessian
   AlignedArray lines;                    ///< scratch of the kernels
@@ -143,6 +144,7 @@ class FullPotential {
     return std::ranges::any_of(scene_.examples, [](const ExampleSettings& own) { return own.damping > 0; });
   }
   MeshInertia terms() const noexcept;
+  const double* near_field() noexcept;
 
   /// That of one function.
   static Eigen::Map<Eigen::Vector3d> at(AlignedArray& coefficients, Eigen::Index k) noexcept {
@@ -174,6 +176,7 @@ class FullPotential {
   MotionSample frame_;                                   ///< at the end of the step, of a carried body
   std::array<double, kMeshSums> sums_{};
   double work_ = 0, external_norm_ = 0, reach_ = 0;
+  const double* elements_at_ = workspace_.x.data();  ///< displacements that elements see
   bool has_elastic_target_ = false;
   bool coefficients_stand_ = false;  ///< true where the workspace has those of the last d
 };

@@ -100,6 +100,26 @@ StepScene loaded(const FullBar& bar, double time_step, double tolerance = 1e-9) 
 }
 
 // The gradient is in double precision: the tolerance is met whatever the precision of the directions.
+// A vertex at 1e7 m is known to 2e-9 m, a strain of 1e-8 in an edge beside one of 1e-2.
+TEST(FullStepTest, IsTheSameFarFromTheOrigin) {
+  const FullBar bar({.free = true});
+  const StepScene scene = full_scene(0.004, 1e-6);
+  const Eigen::VectorXd u = 0.01 * test::random_vector(bar.space.size(), 3);
+  double elastic[2];
+  for (const bool far : {false, true}) {
+    FullWorkspace workspace(bar.model, scene);
+    Eigen::VectorXd q = u;
+    for (Eigen::Index i = 0; far && i < q.size(); i += 3) q[i + 1] += 1e7;
+    State state = make_state(bar.model, q, Eigen::VectorXd::Zero(q.size()), workspace);
+    for (int i = 0; i < 10; ++i) {
+      ASSERT_EQ(step(bar.model, scene, state, workspace).status, 0U) << far << i;
+    }
+    elastic[far ? 1 : 0] = energies(bar.model, scene, state, workspace).elastic;
+  }
+  EXPECT_GT(elastic[0], 0);
+  EXPECT_NEAR(elastic[1], elastic[0], 1e-4 * elastic[0]);
+}
+
 TEST(FullStepTest, MeetsATightTolerance) {
   for (const MaterialModel model : kModels)
     for (const Formulation formulation : kFormulations) {
