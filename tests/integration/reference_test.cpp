@@ -8,6 +8,7 @@
 #include "runtime/scene/scene_loader.h"
 #include "runtime/sim/step/stepper.h"
 #include "tests/integration/support.h"
+#include "tests/support/sparse_space/sparse_model.h"
 
 namespace exmat::test {
 namespace {

@@ -90,7 +90,7 @@ TEST_F(Regions, HaveTheirOwnPartOfTheBundle) {
   EXPECT_EQ(region.examples.examples[1].name, "twist");
   EXPECT_TRUE(region.targets);
   for (const int v : region.vertices) EXPECT_GE(model.object->mesh.vertices(v, 0), 1.99);
-  const auto& [T, T_plus, Z] = region.projection;
+  const auto& [T, T_plus, scale, Z] = region.projection;
   const RowMatrix filter = T_plus * T;
   EXPECT_LE((filter - filter.transpose()).norm(), 1e-12 * filter.norm());
   EXPECT_GE(Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(Eigen::MatrixXd(filter)).eigenvalues().minCoeff(), -1e-12);

@@ -119,7 +119,7 @@ TEST_F(SceneRunTest, ReadsTheExamplesOnlyForAnExampleForce) {
   expected.insert({"/examples/gram", "/examples/h0", "/examples/hq", "/examples/rest/reduced",
                    "/examples/pose1/reduced", "/examples/pose2/reduced", "/examples/rest/pose", "/examples/pose1/pose",
                    "/examples/pose2/pose", "/projection/shape_from_reduced", "/projection/reduced_from_shape",
-                   "/projection/target_basis"});
+                   "/projection/filter_scale", "/projection/target_basis"});
   EXPECT_EQ(datasets(loaded), expected);
   EXPECT_EQ(loaded.model->example_count(), 3);
 }

@@ -503,6 +503,7 @@ FullStep::Outcome FullStep::find_direction(double tolerance, int most_iterations
   set_scales();
   const double size = work.gradient.norm();
   residual = (work.gradient * (-1 / size)).cast<float>();
+  project_held(space_, memory_.attachments, work.residual.data());
   float square = begin_preconditioning();
   end_preconditioning();
   search = solved;
@@ -617,6 +618,7 @@ NewtonStatus FullStep::minimise() noexcept {
         continue;
     } else if (tangents_are_current_) {
       potential_.evaluate_elements(work.d, FullPotential::Tangents::kNone, false);
+      here_ = potential_.gradient_there(work.d, work.gradient);  // and what frames bear there
       const bool is_at_rest = report_.residual <= scene_.space.newton.tolerance * here_.force_scale;
       return is_at_rest ? NewtonStatus::kConverged : NewtonStatus::kStagnated;
     }
