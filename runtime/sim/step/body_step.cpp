@@ -212,7 +212,6 @@ StepReport BodyStep::finish(const NewtonReport& newton) noexcept {
                       state_.contacts.longest_way_out() == 0 && is_isolated(scene_, state_, workspace_.near->contact);
   Start start;
   if (unbalanced || closed) start.energies = energies(model_, scene_, state_);
-  if (closed) start.motion = model_.frame->motion(state_.frame);
   if (closed) start.springs = workspace_.near->contact.start_energy();
   take(newton);
   if (closed && (report_.status & kStepNonFinite) == 0) {
@@ -254,17 +253,6 @@ void BodyStep::limit_energy(const Start& start, bool converged) noexcept {
   const Energies now = energies(model_, scene_, state_);
   const double allowed = start.energies.total() + start.springs, held = now.elastic + now.potential + springs;
   const double rounding = kGain * (std::abs(allowed) + start.energies.kinetic + start.springs + springs);
-  if (held > allowed + rounding) {
-    report_.status |= kStepStagnated;
-    state_.q = state_.q_previous;
-    state_.v.setZero();
-    state_.elastic_energy = start.energies.elastic;
-    FrameMotion motion = start.motion;
-    motion.linear_velocity.setZero();
-    motion.angular_velocity.setZero();
-    model_.frame->set_motion(motion, state_.q, state_.v, workspace_.frame, state_.frame);
-    return;
-  }
   if (converged && now.kinetic + held <= allowed + rounding) return;
   limit_kinetic_energy(converged ? allowed - held
                                  : std::min(allowed - springs, start.energies.total()) - now.elastic - now.potential);

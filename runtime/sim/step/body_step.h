@@ -55,10 +55,10 @@ class BodyStep {
   /// Takes the solution in the workspace, unless it is not finite.
   const StepReport& take(const NewtonReport& newton) noexcept;
 
-  /// After take() of a step near obstacles that stand still: the body has no more energy than it began with.
+  /// After take() of a step near obstacles that stand still: the body goes no faster than the energy
+  /// allows that it began with.
   struct Start {
     Energies energies;
-    FrameMotion motion;
     double springs = 0;  ///< energy of those of the obstacles [J]
   };
   void limit_energy(const Start& start, bool converged) noexcept;

@@ -737,22 +737,16 @@ bool FullStep::is_closed() const noexcept {
          std::ranges::none_of(memory_.found->obstacles, moves);
 }
 
-// Springs of vertices that the step has brought deep, as through an edge, were paid for by nobody: a body that would
-// have more energy than `allowed` without moving stays where the step began, at rest.
-void FullStep::keep_energy(double allowed, double elastic_before) noexcept {
+// Springs of vertices that the step has brought deep, as through an edge, were paid for by nobody: the body goes no
+// faster than its energy allows.
+void FullStep::keep_energy(double allowed) noexcept {
   const Energies now = energies_of(model_, scene_, state_, memory_.bones);
   const double springs = memory_.found->end_energy(Eigen::Vector3d::Zero());
   const double held = now.elastic + now.potential + springs;
   const double rounding = kGain * (std::abs(allowed) + now.kinetic + std::abs(held));
   if (now.kinetic + held <= allowed + rounding) return;
-  if (held > allowed + rounding) {
-    report_.status |= kStepStagnated;
-    state_.q = state_.q_previous;
-    state_.elastic_energy = elastic_before;
-    state_.v.setZero();
-  } else {
-    state_.v *= std::sqrt(std::max(0.0, allowed - held) / now.kinetic);
-  }
+  if (!(now.kinetic > 0)) return;
+  state_.v *= std::sqrt(std::max(0.0, allowed - held) / now.kinetic);
   space_.to_field(state_.q, workspace_.trial);
   space_.to_field(state_.v, workspace_.field);
   if (model_.rigid) model_.rigid->place(workspace_.trial.data(), workspace_.potential.rigid);
@@ -792,7 +786,7 @@ const FullReport& FullStep::finish(const FrameMomenta& others) noexcept {
   }
   const bool unbalanced = (near_ || among_others_) && status_ != NewtonStatus::kConverged;
   const bool closed = is_closed();
-  const double elastic = potential_.elastic_energy(), elastic_before = state_.elastic_energy;
+  const double elastic = potential_.elastic_energy();
   if (closed)
     energy = energies_of(model_, scene_, state_, memory_.bones).total() + memory_.found->start_energy();
   else if (unbalanced && !among_others_)
@@ -819,7 +813,7 @@ const FullReport& FullStep::finish(const FrameMomenta& others) noexcept {
       limit_energy(energy);
     else if (model_.rigid && !unbalanced)
       correct_momenta(others);
-    if (closed) keep_energy(energy, elastic_before);
+    if (closed) keep_energy(energy);
   }
   end_attachments();
   if (model_.skin) end_bones();

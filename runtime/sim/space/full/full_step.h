@@ -223,7 +223,7 @@ class FullStep {
   void move_centre(const Eigen::Vector3d& velocity) noexcept;
   void limit_energy(double allowed) noexcept;
   bool is_closed() const noexcept;
-  void keep_energy(double allowed, double elastic_before) noexcept;
+  void keep_energy(double allowed) noexcept;
 
   const FullModel& model_;
   const FullSpace& space_;
