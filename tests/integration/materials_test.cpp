@@ -138,31 +138,36 @@ TEST_P(MaterialPipeline, BodySettlesAtItsExample) {
   }
 }
 
-// In all vertices and in the modes the body comes to rest at the same pose, as far as the modes hold it.
+// In all vertices and in the modes the body comes to rest at the same pose, as far as these few modes hold it: no
+// farther apart than where density is uniform.
 TEST_F(MaterialFiles, SeveralDensitiesHaveExamplesInAllVertices) {
-  const ReducedModel uniform = built(Json::object());
-  EXPECT_EQ(uniform.projection->filter_scale.size(), 0);
-  folder_.write("two.veg", to_veg(*uniform.object));
-  const ReducedModel model =
-      built(R"({ "mesh": "two.veg", "material": { "model": "corotational", "youngs_modulus": null,
-                                        "poisson_ratio": null, "density": null } })"_json);
-  EXPECT_EQ(3 * model.projection->filter_scale.size(), model.projection->shape_from_reduced.rows());
-  const SceneConfig config = load_scene(write_scene(folder_, R"({
-    "time_step": 0.01, "steps": 400, "damping": { "mass": 2 }, "space": "full",
-    "examples": { "stiffness": 1e5, "damping": 100, "bias": 0 } })"_json));
-  const runtime::LoadedScene loaded = runtime::load_run(config);
-  ASSERT_TRUE(loaded.full);
-  runtime::Workspace workspace(*loaded.model, loaded.scene);
-  runtime::FullWorkspace own(*loaded.full, loaded.scene);
-  runtime::State reduced = make_state(*loaded.model), full = reduced;
-  runtime::enter_full_space(*loaded.full, *loaded.model, full);
-  for (int i = 0; i < config.steps; ++i) {
-    ASSERT_EQ(runtime::step(*loaded.model, loaded.scene, reduced, workspace).status, 0U) << i;
-    ASSERT_EQ(runtime::step_in_full_space(*loaded.full, *loaded.model, loaded.scene, full, workspace, own).status, 0U)
-        << i;
-  }
-  const Eigen::MatrixXd& filter = loaded.model->examples.front().filter;
-  EXPECT_LE((filter * (full.q - reduced.q)).norm(), 0.05 * (filter * full.q).norm());
+  const auto apart = [&](const Json& object, bool is_uniform) {
+    const ReducedModel model = built(object);
+    const Eigen::Index seen = is_uniform ? 0 : model.projection->shape_from_reduced.rows() / 3;
+    EXPECT_EQ(model.projection->filter_scale.size(), seen);
+    if (is_uniform) folder_.write("two.veg", to_veg(*model.object));
+    const SceneConfig config = load_scene(write_scene(folder_, R"({
+      "time_step": 0.01, "steps": 400, "damping": { "mass": 2 }, "space": "full",
+      "examples": { "stiffness": 1e5, "damping": 100, "bias": 0 } })"_json));
+    const runtime::LoadedScene loaded = runtime::load_run(config);
+    runtime::Workspace workspace(*loaded.model, loaded.scene);
+    runtime::FullWorkspace own(*loaded.full, loaded.scene);
+    runtime::State reduced = make_state(*loaded.model), full = reduced;
+    runtime::enter_full_space(*loaded.full, *loaded.model, full);
+    std::uint32_t status = 0;
+    for (int i = 0; i < config.steps; ++i) {
+      status |= runtime::step(*loaded.model, loaded.scene, reduced, workspace).status;
+      status |= runtime::step_in_full_space(*loaded.full, *loaded.model, loaded.scene, full, workspace, own).status;
+    }
+    EXPECT_EQ(status, 0U);
+    const Eigen::MatrixXd& filter = loaded.model->examples.front().filter;
+    return (filter * (full.q - reduced.q)).norm() / (filter * full.q).norm();
+  };
+  const double of_one = apart(R"({ "material": { "model": "corotational" } })"_json, true);
+  EXPECT_LE(apart(R"({ "mesh": "two.veg", "material": { "model": "corotational", "youngs_modulus": null,
+                       "poisson_ratio": null, "density": null } })"_json,
+                  false),
+            of_one);
 }
 
 TEST_F(MaterialFiles, APolynomialOfAnotherMaterialIsRefused) {
