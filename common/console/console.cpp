@@ -222,11 +222,11 @@ void apply(const CommonOptions& options) {
   else if (omp_get_max_threads() > kMostThreads)
     throw InputError({"OMP_NUM_THREADS", "", fmt::format("at most {} threads", kMostThreads),
                       std::to_string(omp_get_max_threads()), ""});
+  constexpr std::string_view kSets[] = {"portable", "avx2", "avx512"};
   const char* const set = std::getenv("EXMAT_SIMD");
-  if (set != nullptr && std::string_view(set) != "portable" && std::string_view(set) != "avx2" &&
-      std::string_view(set) != "avx512")
-    throw InputError(
-        {"EXMAT_SIMD", "", "portable, avx2 or avx512", set, "leave it out for the fastest of this machine"});
+  if (set != nullptr && std::ranges::find(kSets, set) == std::end(kSets))
+    throw InputError({"EXMAT_SIMD", "", fmt::format("{}", fmt::join(kSets, ", ")), set,
+                      "leave it out for the fastest of this machine"});
 }
 
 int run_program(CLI::App& app, int argc, char** argv, const std::function<void()>& action) {

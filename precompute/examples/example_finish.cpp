@@ -155,7 +155,7 @@ PoseFitter::Finished PoseFitter::finish_group(std::size_t index, const ReducedMo
   Finished finished{group.examples, direct_projection(stage_.object, stage_.weights, system_.full_mass,
                                                       whole ? basis : RowMatrix(group.view->see(basis)))};
   finished.projection.filter_scale =
-      filter_scale(stage_.object, stage_.weights, {stage_.object, object_.mesh, object_.materials.density});
+      filter_scale(stage_.object, stage_.weights, object_.mesh, object_.materials.density);
   const RowMatrix map = whole && !system_.constrained() ? finished.projection.reduced_from_shape
                                                         : pose_map(poses_[index], system_, basis);
   finished.projection.target_basis = range_basis(map);

@@ -36,7 +36,7 @@ class FullSpaceStepper {
  public:
   explicit FullSpaceStepper(const FullSpaceModel& model) : model_(model), targets_(model.examples.size()) {}
 
-  /// What acts on the body in the next steps. Throws InputError: obstacles of a model without contact vertices.
+  /// Takes what acts on the body in the next steps. Throws InputError: obstacles of a model without contact vertices.
   void set(const FullSpaceScene& scene);
 
   FullSpaceReport step(FullSpaceState& state);

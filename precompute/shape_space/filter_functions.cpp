@@ -6,16 +6,21 @@
 #include "precompute/shape_space/projection.h"
 
 namespace exmat::precompute {
+namespace {
+
+double root_of_mass(const TetMesh& mesh, const Eigen::VectorXd& density) {
+  return std::sqrt(scalar_mass(mesh, density).sum());
+}
+
+}  // namespace
 
 FilterFunctions::FilterFunctions(const LaplaceBasis& object, const TetMesh& mesh, const Eigen::VectorXd& density)
-    : analysis(object.mass * object.eigenfunctions),
-      root_over_analysis(std::sqrt(scalar_mass(mesh, density).sum())),
-      is_uniform((density.array() == density[0]).all()) {}
+    : analysis(object.mass * object.eigenfunctions), root_over_analysis(root_of_mass(mesh, density)) {}
 
-Eigen::VectorXd filter_scale(const LaplaceBasis& object, const Eigen::VectorXd& weights,
-                             const FilterFunctions& functions) {
-  if (functions.is_uniform) return {};
-  return functions.root_over_analysis * std::cbrt(object.volume) * weights.cwiseInverse();
+Eigen::VectorXd filter_scale(const LaplaceBasis& object, const Eigen::VectorXd& weights, const TetMesh& mesh,
+                             const Eigen::VectorXd& density) {
+  if ((density.array() == density[0]).all()) return {};
+  return root_of_mass(mesh, density) * std::cbrt(object.volume) * weights.cwiseInverse();
 }
 
 RowMatrix weight_slopes(const LaplaceBasis& object, Weighting weighting, const ExampleSet& set) {

@@ -12,15 +12,14 @@ namespace exmat::precompute {
 struct FilterFunctions {
   RowMatrix analysis;             ///< n x m, (M_s/V) Phi
   double root_over_analysis = 0;  ///< m^(1/2) [kg^(1/2)]
-  bool is_uniform = true;         ///< true if all tets have one density
 
   FilterFunctions() = default;
   FilterFunctions(const LaplaceBasis& object, const TetMesh& mesh, const Eigen::VectorXd& density);
 };
 
 /// [m] ProjectionData::filter_scale of descriptors of these weights.
-Eigen::VectorXd filter_scale(const LaplaceBasis& object, const Eigen::VectorXd& weights,
-                             const FilterFunctions& functions);
+Eigen::VectorXd filter_scale(const LaplaceBasis& object, const Eigen::VectorXd& weights, const TetMesh& mesh,
+                             const Eigen::VectorXd& density);
 
 /// [K x 3m] slopes of the load of the weights problem in Phi^T (M_s/V) u, row 3i + axis: h = h0 + slopes c.
 RowMatrix weight_slopes(const LaplaceBasis& object, Weighting weighting, const ExampleSet& set);

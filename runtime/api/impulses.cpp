@@ -20,7 +20,7 @@ exmat_status check_points(const char* function, const exmat_body& body, const ex
   return require_rows(function, points.set);
 }
 
-/// Of a body in full space, as it is in `state`.
+/// Response of a body in full space, as it is in `state`.
 FullImpulseResponse full_response(const exmat_body& body, State& state) {
   World& world = body.world->world;
   const int place = place_of(body);

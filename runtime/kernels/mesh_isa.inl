@@ -66,7 +66,7 @@ inline Group repeat_vertex(const Group* v) {
     return v[i];
 }
 
-/// Of four fields of groups, the sum of each over its vertices: four vertices.
+/// Adds up the vertices of each of four fields of groups: four sums, each a vertex.
 template <class Group>
 inline void add_vertices(const Group* v, Group* sums) {
   if constexpr (kVertices<Group> == 4) {

@@ -164,6 +164,10 @@ class Stepper {
     return report;
   }
 
+  runtime::Energies energies() const {
+    return world_ ? world_->energies(0) : runtime::energies(*loaded_.model, loaded_.scene, state_);
+  }
+
  private:
   const runtime::LoadedScene& loaded_;
   runtime::State& state_;
@@ -206,7 +210,7 @@ ReducedRun run_reduced(const SceneConfig& config, const std::vector<double>& tim
         frames.positions.push_back(std::move(now.positions));
         frames.velocities.push_back(std::move(now.velocities));
       },
-      [&] { return runtime::energies(loaded.full.get(), *loaded.model, loaded.scene, state); }, centre);
+      [&] { return stepper.energies(); }, centre);
   return result;
 }
 

@@ -14,8 +14,6 @@
 namespace exmat::runtime {
 namespace {
 
-constexpr double kGain = 1e-12;  // of energies: rounding
-
 constexpr double kResolvedTurn = 0.3;  // [rad] of a free body in one step
 
 FrameStep frame_step(const StepScene& scene, const State& state) {
@@ -206,19 +204,23 @@ NewtonReport BodyStep::solve() noexcept {
 }
 
 StepReport BodyStep::finish(const NewtonReport& newton) noexcept {
-  const bool converged = newton.status == NewtonStatus::kConverged;
-  const bool unbalanced = near_ && !held_ && !converged;
+  const bool unbalanced = near_ && !held_ && newton.status != NewtonStatus::kConverged;
   const bool closed = near_ && !held_ && !model_.frame->is_driven() && workspace_.near->contact.loaded_count > 0 &&
                       state_.contacts.longest_way_out() == 0 && is_isolated(scene_, state_, workspace_.near->contact);
-  Start start;
-  if (unbalanced || closed) start.energies = energies(model_, scene_, state_);
-  if (closed) start.springs = workspace_.near->contact.start_energy();
+  const Energies before = unbalanced || closed ? energies(model_, scene_, state_) : Energies{};
+  const double springs = closed ? workspace_.near->contact.start_energy() : 0;
   take(newton);
-  if (closed && (report_.status & kStepNonFinite) == 0) {
-    limit_energy(start, converged);
-  } else if (unbalanced && (report_.status & kStepNonFinite) == 0) {
+  if ((unbalanced || closed) && (report_.status & kStepNonFinite) == 0) {
     const Energies now = energies(model_, scene_, state_);
-    limit_kinetic_energy(start.energies.total() - now.elastic - now.potential);
+    double allowed = before.total() - now.elastic - now.potential, rounding = 0;
+    if (closed) {
+      // Springs of vertices that the step has brought deep, as through an edge, were paid for by nobody.
+      const double held = workspace_.near->contact.end_energy(model_.frame->placement(state_.frame).position);
+      allowed += unbalanced ? std::min(0.0, springs - held) : springs - held;
+      if (!unbalanced)
+        rounding = kEnergyRounding * (std::abs(before.total() + springs) + before.kinetic + springs + held);
+    }
+    if (now.kinetic > allowed + rounding) limit_kinetic_energy(allowed);
   }
   if (rests(model_, scene_, report_, state_)) put_to_sleep(model_, state_, workspace_);
   return report_;
@@ -244,18 +246,6 @@ const StepReport& BodyStep::take(const NewtonReport& newton) noexcept {
   if (held_ && end_attachments(pose_of(model_, state_), workspace.near->held, state_.attachments))
     state_.begins_anew = true;
   return report_;
-}
-
-// Springs of vertices that the step has brought deep, as through an edge, were paid for by nobody.
-void BodyStep::limit_energy(const Start& start, bool converged) noexcept {
-  const ContactWorkspace& contact = workspace_.near->contact;
-  const double springs = contact.end_energy(model_.frame->placement(state_.frame).position);
-  const Energies now = energies(model_, scene_, state_);
-  const double allowed = start.energies.total() + start.springs, held = now.elastic + now.potential + springs;
-  const double rounding = kGain * (std::abs(allowed) + start.energies.kinetic + start.springs + springs);
-  if (converged && now.kinetic + held <= allowed + rounding) return;
-  limit_kinetic_energy(converged ? allowed - held
-                                 : std::min(allowed - springs, start.energies.total()) - now.elastic - now.potential);
 }
 
 void BodyStep::limit_kinetic_energy(double allowed) noexcept {

@@ -8,7 +8,6 @@
 #include "runtime/sim/step/scene.h"
 #include "runtime/sim/step/state.h"
 #include "runtime/sim/step/step_report.h"
-#include "runtime/sim/step/stepper.h"
 #include "runtime/sim/step/workspace.h"
 
 namespace exmat::runtime {
@@ -54,14 +53,6 @@ class BodyStep {
 
   /// Takes the solution in the workspace, unless it is not finite.
   const StepReport& take(const NewtonReport& newton) noexcept;
-
-  /// After take() of a step near obstacles that stand still: the body goes no faster than the energy
-  /// allows that it began with.
-  struct Start {
-    Energies energies;
-    double springs = 0;  ///< energy of those of the obstacles [J]
-  };
-  void limit_energy(const Start& start, bool converged) noexcept;
 
   /// After take(): slows the body down to a kinetic energy of at most `allowed` [J]; the force of the contacts tells
   /// the difference.

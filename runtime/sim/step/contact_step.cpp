@@ -48,12 +48,16 @@ bool is_near_obstacles(const Model& model, const StepScene& scene, double pushed
   return true;
 }
 
-bool is_isolated(const StepScene& scene, const State& state, const ContactWorkspace& contact) noexcept {
+bool is_isolated(const StepScene& scene, const ContactWorkspace& contact) noexcept {
   const auto moves = [](const PlacedObstacle& placed) { return placed.obstacle->motion.moves(); };
+  return !(contact.candidate_count > 0 && std::ranges::any_of(contact.obstacles, moves)) && !runs_examples(scene) &&
+         scene.forces.empty();
+}
+
+bool is_isolated(const StepScene& scene, const State& state, const ContactWorkspace& contact) noexcept {
   const auto* const free = std::get_if<FreeState>(&state.frame);
-  return !(contact.candidate_count > 0 && std::ranges::any_of(contact.obstacles, moves)) &&
-         !holds_modes(state.attachments) && !runs_examples(scene) && scene.forces.empty() &&
-         state.applied_force.isZero(0) && state.vertex_force.isZero(0) &&
+  return is_isolated(scene, contact) && !holds_modes(state.attachments) && state.applied_force.isZero(0) &&
+         state.vertex_force.isZero(0) &&
          (free == nullptr || (free->applied_force.isZero(0) && free->applied_torque.isZero(0)));
 }
 

@@ -14,8 +14,13 @@ BodyPose pose_of(const Model& model, const State& state) noexcept;
 bool is_near_obstacles(const Model& model, const StepScene& scene, double pushed, State& state,
                        Workspace& workspace) noexcept;
 
-/// True if nothing but gravity and obstacles that stand still changes the energy of a body, its frame aside.
+/// True if nothing but gravity and obstacles that stand still changes the energy of a body, its frame aside; of the
+/// scene and the obstacles near alone, or of the state, too.
+bool is_isolated(const StepScene& scene, const ContactWorkspace& contact) noexcept;
 bool is_isolated(const StepScene& scene, const State& state, const ContactWorkspace& contact) noexcept;
+
+/// Relative gain of energies in the modes that is rounding.
+inline constexpr double kEnergyRounding = 1e-12;
 
 /// The unknowns of a step near something, into workspace.near->x: of free flight, and of workspace.q.
 void start_contact(const Model& model, const StepScene& scene, const State& state, Workspace& workspace) noexcept;

@@ -31,9 +31,6 @@ void FullMember::place_surface() {
 }
 
 bool FullMember::begin(const StepScene& scene, double pushed) noexcept {
-  FullMotion& motion = *state_.full;
-  if (!motion.begins_anew)  // its last step, without others, may not have been evaluated at its end
-    motion.elastic_energy = elastic_energy(full_, scene, motion, own_, motion.skeleton ? &*motion.skeleton : nullptr);
   step_.emplace(full_, model_, scene, state_, workspace_, own_);
   return step_->begin(/*touches_others=*/true, pushed);
 }

@@ -20,7 +20,6 @@ constexpr double kShareOfLimit = 0.3, kLeastExact = 0.1;
 constexpr double kRoughTolerance = 0.03;
 constexpr int kMostGradients = 400;
 constexpr int kSureIterations = 8;  // of Newton's method: bodies at rest take fewer
-constexpr double kGain = 1e-12;     // of energies: rounding
 // Likewise where bodies step in all vertices: each of their iterations costs as much as many of others.
 constexpr double kFullSolutionError = 0.03;
 
@@ -798,7 +797,8 @@ NewtonReport end_island_step(std::span<WorldBody* const> bodies, std::span<PairC
     const double obstacles = start.isolated ? obstacle_energy(bodies) : 0;
     const double allowed =
         start.bodies.total + start.obstacles - obstacles + (converged ? start.accounts : start.springs);
-    const double rounding = kGain * (std::abs(start.bodies.total) + start.bodies.kinetic + start.obstacles + obstacles);
+    const double rounding =
+        kEnergyRounding * (std::abs(start.bodies.total) + start.bodies.kinetic + start.obstacles + obstacles);
     const bool gains = start.isolated && energy_of(bodies, pairs).total > allowed + rounding;
     if (!converged || gains) limit_energy(bodies, pairs, workspace.begin, start.isolated, allowed);
     // The torque that attachments have for the angular momentum may give a little energy: to take it away is no fault.

@@ -105,7 +105,7 @@ void begin_of(std::span<WorldBody* const> bodies, IslandBegin& begin) {
     const bool touches = own->state.contacts.count > 0 || (obstacles.candidate_count > 0 && obstacles.loaded_count > 0);
     begin.bodies[i].motion = frame.motion(own->state.frame);
     begin.bodies[i].q = own->state.full ? own->state.full->q : own->state.q;
-    begin.bodies[i].elastic_energy = own->state.elastic_energy;
+    begin.bodies[i].elastic_energy = own->state.full ? own->state.full->elastic_energy : own->state.elastic_energy;
     begin.is_alone &= momenta && !touches && !holds_modes(own->state.attachments);
     if (!begin.is_alone) continue;
     // The centre of mass goes along its momentum: where the step begins and where it ends give the same.

@@ -48,7 +48,7 @@ inline void add_region(ReducedModel& model, const std::string& name, const FlagV
   added.projection = direct_projection(basis, descriptor_weights(basis, model.shape_space->weighting), system.full_mass,
                                        RowMatrix(view.see(model.modal->basis)));
   added.projection.filter_scale = filter_scale(basis, descriptor_weights(basis, model.shape_space->weighting),
-                                               FilterFunctions(basis, object.mesh, object.materials.density));
+                                               object.mesh, object.materials.density);
   const ExamplePoses poses = region_example_poses(model, system, {name}).front();
   reduce_examples(model, system, poses, added.projection, added.examples);
 }

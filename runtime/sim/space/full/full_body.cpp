@@ -209,11 +209,10 @@ void FullBodyStep::take_time() noexcept {
   motion.begins_anew = state_.begins_anew;
 }
 
-bool FullBodyStep::stand() noexcept {
+void FullBodyStep::stand() noexcept {
   take_time();
   step_.stand();
   find_targets(full_, model_, scene_, state_, workspace_, step_, own_, report_);
-  return (report_.status & kStepNonFinite) == 0;
 }
 
 void FullBodyStep::push(Eigen::VectorXd& impulses) noexcept {

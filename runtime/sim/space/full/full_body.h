@@ -56,8 +56,8 @@ class FullBodyStep {
 
   // In place of a step, of a body that a host gives impulses between two of them.
 
-  /// FullStep::stand(), weights and target. False where numbers are not finite.
-  bool stand() noexcept;
+  /// FullStep::stand(), weights and target.
+  void stand() noexcept;
   /// FullStep::push(). The body wakes.
   void push(Eigen::VectorXd& impulses) noexcept;
 

@@ -146,7 +146,7 @@ class FullPotential {
   MeshInertia terms() const noexcept;
   const double* near_field() noexcept;
 
-  /// That of one function.
+  /// The coefficient of one function.
   static Eigen::Map<Eigen::Vector3d> at(AlignedArray& coefficients, Eigen::Index k) noexcept {
     return Eigen::Map<Eigen::Vector3d>(coefficients.data() + 4 * k);
   }

@@ -58,7 +58,7 @@ class FullFilter {
   MeshFilter<Number> arrays() const noexcept {
     return {vertices_, std::ssize(starts_) - 1, starts_.data(), rows_.data(), values_.data()};
   }
-  /// Of the coefficients.
+  /// Count of numbers in the coefficients.
   Eigen::Index numbers() const { return 4 * kFactorBlock * (std::ssize(starts_) - 1); }
   bool empty() const { return values_.size() == 0; }
 

@@ -5,6 +5,8 @@
 #include <limits>
 #include <span>
 
+#include "runtime/sim/step/contact_step.h"
+
 namespace exmat::runtime {
 namespace {
 
@@ -15,8 +17,8 @@ constexpr int kContactIterations = 60;  // of conjugate gradients near obstacles
 constexpr double kWeakFilter = 0.25;    // of the mass's share, that the preconditioner does without
 constexpr double kLongStep = 0.008;     // [s]
 constexpr double kDelicate = 0.1;       // of the accuracy, in long steps and without damping of stiffness
+constexpr double kGain = 1e-6;          // of energies, to which steps are solved
 constexpr FullAccuracy kResponse{1e-5, 300, 0};
-constexpr double kGain = 1e-6;    // of energies, to which steps are solved
 constexpr double kForcing = 0.3;  // of what is left to the tolerance, that a direction is solved to
 
 FullWorkspace::Key key_of(const StepScene& scene) {
@@ -61,7 +63,7 @@ FullWorkspace::Linear make_linear(const FullModel& model, const FullWorkspace::K
     of_functions.segment(examples.first, examples.functions).setConstant(filter);
   }
   linear.is_filtered = !of_functions.isZero(0);
-  // Beside the mass a weak filter changes no more than what conjugate gradients do anyway.
+  // A weak filter beside the mass changes no more than what conjugate gradients do anyway.
   if (of_functions.size() > 0 && of_functions.maxCoeff() <= kWeakFilter * mass) of_functions.setZero();
   linear.preconditioner = FullPreconditioner(space, mass, stiffness + elasticity, of_functions, touches);
   for (Eigen::Index k = 0; k < space.entries(); ++k)
@@ -276,7 +278,7 @@ void FullStep::end_bones() noexcept {
   bones.anew = false;
 }
 
-// What the body is displaced by beside its bones, where the workspace's skin is.
+// Sets what displaces the body beside its bones, where the workspace's skin is.
 void FullStep::set_own() noexcept {
   space_.to_field(state_.q, workspace_.trial);
   model_.skin->to_own(workspace_.potential.skin, workspace_.trial.data(), workspace_.field.data());
@@ -326,7 +328,7 @@ void FullStep::choose_first_iterate() noexcept {
   stay(at_rest);
   double at_start = 0;
   if (is_checked() && comes_unchecked()) {
-    potential_.evaluate_elements(at_rest, FullPotential::Tangents::kNone, true);
+    potential_.evaluate_elements(at_rest, FullPotential::Tangents::kNone, false);
     at_start = potential_.undamped();
     state_.elastic_energy = potential_.elastic_energy();
   } else if (is_checked()) {
@@ -719,37 +721,21 @@ void FullStep::move_centre(const Eigen::Vector3d& velocity) noexcept {
   rigid.centre += shift;
 }
 
-// A solution that did not converge may hold contact forces that throw the body.
-void FullStep::limit_energy(double allowed) noexcept {
-  const Energies now = energies(model_, scene_, state_, workspace_);
-  const double limit = std::max(0.0, allowed - now.elastic - now.potential);
-  if (now.kinetic <= limit) return;
-  state_.v *= std::sqrt(limit / now.kinetic);
-  space_.to_field(state_.v, workspace_.field);
-}
-
 // True if nothing but gravity and obstacles that stand still, which it touches, changes the energy of the body.
 bool FullStep::is_closed() const noexcept {
-  const auto moves = [](const PlacedObstacle& placed) { return placed.obstacle->motion.moves(); };
-  return near_ && !among_others_ && memory_.found->loaded_count > 0 && memory_.held->longest_way_out() == 0 &&
-         !model_.is_driven() && !is_attached() && std::ranges::none_of(scene_.examples, acts) &&
-         scene_.forces.empty() && state_.applied_force.isZero(0) &&
-         std::ranges::none_of(memory_.found->obstacles, moves);
+  return memory_.found->loaded_count > 0 && memory_.held->longest_way_out() == 0 && state_.applied_force.isZero(0) &&
+         is_isolated(scene_, *memory_.found);
 }
 
-// Springs of vertices that the step has brought deep, as through an edge, were paid for by nobody: the body goes no
-// faster than its energy allows.
-void FullStep::keep_energy(double allowed) noexcept {
+// A solution that did not converge may hold contact forces that throw the body, and springs of vertices that a step has
+// brought deep, as through an edge, were paid for by nobody: the body goes no faster than `allowed` leaves it.
+void FullStep::limit_energy(double allowed, double springs, double gain) noexcept {
   const Energies now = energies_of(model_, scene_, state_, memory_.bones);
-  const double springs = memory_.found->end_energy(Eigen::Vector3d::Zero());
   const double held = now.elastic + now.potential + springs;
-  const double rounding = kGain * (std::abs(allowed) + now.kinetic + std::abs(held));
-  if (now.kinetic + held <= allowed + rounding) return;
-  if (!(now.kinetic > 0)) return;
+  const double rounding = gain * (std::abs(allowed) + now.kinetic + std::abs(held));
+  if (!(now.kinetic > 0) || now.kinetic + held <= allowed + rounding) return;
   state_.v *= std::sqrt(std::max(0.0, allowed - held) / now.kinetic);
-  space_.to_field(state_.q, workspace_.trial);
   space_.to_field(state_.v, workspace_.field);
-  if (model_.rigid) model_.rigid->place(workspace_.trial.data(), workspace_.potential.rigid);
 }
 
 void FullStep::end_attachments() noexcept {
@@ -785,18 +771,17 @@ const FullReport& FullStep::finish(const FrameMomenta& others) noexcept {
     return report_;
   }
   const bool unbalanced = (near_ || among_others_) && status_ != NewtonStatus::kConverged;
-  const bool closed = is_closed();
-  const double elastic = potential_.elastic_energy();
-  if (closed)
-    energy = energies_of(model_, scene_, state_, memory_.bones).total() + memory_.found->start_energy();
-  else if (unbalanced && !among_others_)
-    energy = energies(model_, scene_, state_, workspace_, memory_.bones).total();
+  // Momenta and energy of a body that something holds are its host's, too.
+  const bool is_own = near_ && !among_others_ && !is_attached() && !model_.is_driven();
+  const bool closed = is_own && is_closed(), limited = is_own && (closed || unbalanced);
+  if (limited) energy = energies_of(model_, scene_, state_, memory_.bones).total();
+  if (closed) energy += memory_.found->start_energy();
   state_.q_previous = state_.q;
   state_.v_previous = state_.v;
   state_.v = workspace_.rate;
   state_.a = workspace_.acceleration;
   state_.q += d;
-  state_.elastic_energy = elastic;
+  state_.elastic_energy = potential_.elastic_energy();
   if (near_) {
     report_.contacts = memory_.found->touching;
     report_.contact_force = memory_.found->force;
@@ -807,14 +792,9 @@ const FullReport& FullStep::finish(const FrameMomenta& others) noexcept {
   }
   if (near_) model_.contacts->commit(workspace_.trial.data(), *memory_.found, *memory_.held);
   if (model_.rigid) model_.rigid->place(workspace_.trial.data(), workspace_.potential.rigid);
-  // Momenta and energy of a body that something holds are its host's, too.
-  if (!is_attached()) {
-    if (unbalanced && !among_others_ && !model_.is_driven() && !closed)
-      limit_energy(energy);
-    else if (model_.rigid && !unbalanced)
-      correct_momenta(others);
-    if (closed) keep_energy(energy);
-  }
+  if (model_.rigid && !unbalanced && !is_attached()) correct_momenta(others);
+  if (limited)
+    limit_energy(energy, closed ? memory_.found->end_energy(Eigen::Vector3d::Zero()) : 0, unbalanced ? 0 : kGain);
   end_attachments();
   if (model_.skin) end_bones();
   if (!near_ && memory_.held != nullptr) memory_.held->count = 0;
@@ -845,7 +825,7 @@ void FullStep::stand() noexcept {
   potential_.evaluate_elements(work.d, FullPotential::Tangents::kExact, true);
 }
 
-// Of a free body the rigid motion is that of the impulses, by the rest of which the body deforms alone: damping and
+// The rigid motion of a free body is that of the impulses, by the rest of which the body deforms alone: damping and
 // single precision see none of it.
 void FullStep::respond(Eigen::VectorXd& impulses) noexcept {
   FullWorkspace& work = workspace_;

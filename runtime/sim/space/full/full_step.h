@@ -221,9 +221,8 @@ class FullStep {
   void give_momenta(const FrameMomenta& momenta) noexcept;
   bool is_free() const noexcept { return model_.rigid && !is_attached(); }
   void move_centre(const Eigen::Vector3d& velocity) noexcept;
-  void limit_energy(double allowed) noexcept;
   bool is_closed() const noexcept;
-  void keep_energy(double allowed) noexcept;
+  void limit_energy(double allowed, double springs, double gain) noexcept;
 
   const FullModel& model_;
   const FullSpace& space_;
