@@ -129,7 +129,8 @@ def main():
             profiles.append(replay(program, corpora, pathlib.Path(folder)))
             print_files(target, files_of([program], profiles[-1:], SOURCES[target]), arguments.missed)
         if not arguments.target:
-            print_files("mesh readers", files_of(programs, profiles, SHARED), arguments.missed)
+            distinct = list(dict.fromkeys(program.resolve() for program in programs))
+            print_files("mesh readers", files_of(distinct, profiles, SHARED), arguments.missed)
 
 
 if __name__ == "__main__":

@@ -1,8 +1,10 @@
-// Any bytes in a file of the extension EXMAT_FUZZ_EXTENSION are a mesh or refused. A TetGen pair is one input, split by
-// the first zero byte, and so are a .veg file and input.inc, which it may include, and a .gltf file and input.bin. Of a
-// .pc2 file the first and the last frame are read, of a glTF file its look, too.
+// Any bytes in a file of a format are a mesh or refused. The format is the last word of the name that the program is
+// called by: exmat_fuzz_veg. A TetGen pair is one input, split by the first zero byte, and so are a .veg file and
+// input.inc, which it may include, and a .gltf file and input.bin. Of a .pc2 file the first and the last frame are
+// read, of a glTF file its look, too.
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <cstring>
 #include <nlohmann/json.hpp>
 
@@ -52,6 +54,14 @@ bool is_surface(std::string_view extension) {
   return std::ranges::find(kSurfaces, extension) != kSurfaces.end();
 }
 
+// Ends the program where the name that it was called by has no format that it knows.
+std::string extension_of(std::string_view program) {
+  constexpr std::array<std::string_view, 6> kOthers{".veg", ".msh", ".mesh", ".vtk", ".node", ".pc2"};
+  const std::string extension = "." + std::string(program.substr(program.rfind('_') + 1));
+  require(is_surface(extension) || std::ranges::find(kOthers, extension) != kOthers.end());
+  return extension;
+}
+
 // With the number of vertices that its header has, and with another.
 void read_frames(const std::filesystem::path& file, std::string_view bytes) {
   std::int32_t vertices = 0, frames = 0;
@@ -78,11 +88,11 @@ void check(const precompute::MeshFile& file) {
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace exmat;
-  const std::string_view extension = EXMAT_FUZZ_EXTENSION;
+  static const std::string extension = extension_of(program_invocation_short_name);
   std::string_view bytes(reinterpret_cast<const char*>(data), size);
   if (extension == ".node" || extension == ".veg" || extension == ".gltf")
     bytes = fuzz::split_off(bytes, extension == ".node" ? ".ele" : extension == ".veg" ? ".inc" : ".bin");
-  const auto file = fuzz::input_file(EXMAT_FUZZ_EXTENSION, bytes);
+  const auto file = fuzz::input_file(extension.c_str(), bytes);
   try {
     if (is_surface(extension)) {
       check(precompute::read_surface_file(file));
