@@ -148,6 +148,18 @@ def public_headers(root):
                 yield f"{name}:{number}: includes {header}"
 
 
+def layouts(root):
+    """The structs that the web package reads and writes have there the members of the C interface, no other and no fewer."""
+    name = "runtime/ports/wasi/layouts.cpp"
+    listed = set(re.findall(r"(?<!define )EXMAT_MEMBER\((\w+), (\w+)\)", (root / name).read_text())) if (root / name).exists() else set()
+    structs = {struct for struct, _ in listed}
+    declared = {(struct, member) for _, path in sources(root, ("runtime/include",))
+                for struct, body in re.findall(r"typedef struct exmat_(\w+) \{(.*?)\}", without_comments_and_strings(path.read_text()), re.S)
+                for member in re.findall(r"(\w+)\s*(?:\[\w+\])?\s*[;,]", body) if struct in structs and member != "reserved"}
+    for struct, member in sorted(listed ^ declared):
+        yield f"{name}: {struct}.{member} is {'not there' if (struct, member) in declared else 'of no public header'}"
+
+
 def python_module(root):
     """The Python package sees the public interface, pybind11 and the standard library: what it can do, any program can."""
     for name, path in sources(root, ("runtime/python",)):
@@ -216,7 +228,7 @@ def formatting(root):
             yield line
 
 
-RULES = {rule.__name__: rule for rule in (direction, lean, hot_path, petsc, decompositions, hdf5, public_headers, python_module, viewer, one_header, mirrored_tests, references, columns, top_level,
+RULES = {rule.__name__: rule for rule in (direction, lean, hot_path, petsc, decompositions, hdf5, public_headers, layouts, python_module, viewer, one_header, mirrored_tests, references, columns, top_level,
                                         formatting)}
 
 

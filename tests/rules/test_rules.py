@@ -50,6 +50,7 @@ PLANTED = [
     ("public_headers", "runtime/include/exmat/x.hpp", "#include <Eigen/Core>\n"),
     ("public_headers", "runtime/include/exmat/x.hpp", '#include "common/core/error.h"\n'),
     ("public_headers", "runtime/include/exmat/x.h", "#include <vector>\n"),
+    ("layouts", "runtime/ports/wasi/layouts.cpp", "EXMAT_MEMBER(ray_hit, body)\n"),
     ("direction", "runtime/python/x.cpp", '#include "runtime/sim/step/state.h"\n'),
     ("python_module", "runtime/python/x.cpp", "#include <fmt/format.h>\n"),
     ("viewer", "runtime/viewer/app/x.cpp", '#include "runtime/sim/step/state.h"\n'),

@@ -110,6 +110,7 @@ constexpr Line kLines[] = {
   EXMAT_MEMBER(ray_hit, shares)
   EXMAT_MEMBER(ray_hit, distance)
   EXMAT_MEMBER(ray_hit, normal)
+  EXMAT_MEMBER(ray_hit, obstacle)
 };
 // clang-format on
 
