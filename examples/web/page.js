@@ -21,7 +21,7 @@ const dragger = new Dragger(view, camera, []);
 const plots = { weights: new Plot(element("weights-plot"), element("weights-key")), energies: new Plot(element("energies-plot"), element("energies-key")) };
 const rods = [];  // from held places to hands
 
-const state = { current: null, name: null, scene: null, read: null, orbit: null, size: 1, weights: [], paused: false, owed: 0, stepTime: 0, speed: 1 };
+const state = { current: null, motion: null, name: null, scene: null, read: null, orbit: null, size: 1, weights: [], paused: false, owed: 0, stepTime: 0, speed: 1 };
 /** For the console, and for tests. */
 window.exmat = { state, dragger, camera, renderer };
 
@@ -45,10 +45,14 @@ takeColours();
 
 function say(text) { element("message").textContent = text; }
 
-async function show(name, scene, read) {
+function announce(name) {
   state.name = name;
   for (const button of element("scenes").children) button.setAttribute("aria-current", String(button.textContent === name));
   say("loading ...");
+}
+
+async function show(name, scene, read) {
+  announce(name);
   try {
     const next = await worldOf(scene, read);
     if (state.name !== name) return free(next);
@@ -69,12 +73,31 @@ async function read(url) {
 }
 const showByName = async (name) => show(name, await (await read(`scenes/${name}.json`)).json(), (file) => read(`scenes/${file}`));
 
+/** Plays the motion of a .glb that `exmat-runtime export` has written: what is in it is drawn, and nothing steps. */
+async function play(name, bytes) {
+  announce(name);
+  const { GLTFLoader } = await import("three/addons/loaders/GLTFLoader.js");
+  const { scene, animations } = await new GLTFLoader().parseAsync(bytes, "");
+  if (state.name !== name) return;
+  end();
+  const mixer = new THREE.AnimationMixer(scene);
+  for (const clip of animations) mixer.clipAction(clip).play();
+  state.motion = { scene, mixer };
+  picture.add(scene);
+  frame(new THREE.Box3().setFromObject(scene), [0, -9.81, 0]);
+  showPanels();
+  say(animations.length > 0 ? "" : `${name} has no motion`);
+}
+
 function end() {
+  if (state.motion !== null) state.motion.scene.traverse((node) => node.geometry?.dispose());
+  state.motion = null;
+  picture.clear().add(sky, camera);
   if (state.current === null) return;
   dragger.releaseAll();
   for (const mesh of dragger.meshes) mesh.dispose();
   for (const { surface } of state.current.models) surface.free();
-  picture.clear().add(sky, camera);
+  dragger.meshes = [];
   rods.length = 0;
   free(state.current);
   state.current = null;
@@ -93,7 +116,13 @@ function begin() {
   const size = box.getSize(new THREE.Vector3()).length();
   for (const obstacle of obstacles) picture.add(obstacleMesh(obstacle, size));
   frame(box, gravity);
+  showPanels();
   showControls();
+}
+
+/** A motion has no settings, and nothing to drag. */
+function showPanels() {
+  for (const panel of document.querySelectorAll("aside > :not(.buttons), #hint")) panel.hidden = state.current === null;
 }
 
 function obstacleMesh({ shape, point = [0, 0, 0], direction = [0, 0, 1], halfExtents, radius, orientation = [1, 0, 0, 0] }, size) {
@@ -142,7 +171,10 @@ element("pause").addEventListener("click", () => {
   state.paused = !state.paused;
   element("pause").setAttribute("aria-pressed", String(state.paused));
 });
-element("reset").addEventListener("click", () => show(state.name, state.scene, state.read));
+element("reset").addEventListener("click", () => {
+  if (state.motion === null) show(state.name, state.scene, state.read);
+  else state.motion.mixer.setTime(0);
+});
 
 for (const radio of document.querySelectorAll("[name=space]"))
   radio.addEventListener("change", () => { for (const body of state.current.world.bodies) body.space = radio.value; });
@@ -247,18 +279,21 @@ view.addEventListener("blur", () => dragger.release(KEYBOARD));
 
 // ---- files ----
 
-/** Shows a scene file with its packs, or one pack by itself. */
+/** Shows a scene file with its packs, one pack by itself, or a motion. */
 async function open(files) {
   const byName = new Map([...files].map((file) => [file.name, file])), names = [...byName.keys()];
   const bytesOf = async (name) => {
     if (!byName.has(name)) throw new Error(`${name}: drop it together with its scene`);
     return new Uint8Array(await byName.get(name).arrayBuffer());
   };
-  const sceneFile = names.find((name) => name.endsWith(".json")), pack = names.find((name) => name.endsWith(".exmat"));
+  const ending = (end) => names.find((name) => name.toLowerCase().endsWith(end));
+  const sceneFile = ending(".json"), pack = ending(".exmat"), motion = ending(".glb"), bundle = ending(".h5");
   try {
     if (sceneFile) return await show(sceneFile, JSON.parse(await byName.get(sceneFile).text()), bytesOf);
     if (pack) return await show(pack, await sceneOf(pack, bytesOf), bytesOf);
-    say(`${names.join(", ")}: expected a pack (.exmat), or a scene (.json) with its packs`);
+    if (motion) return await play(motion, await byName.get(motion).arrayBuffer());
+    if (bundle) return say(`${bundle}: a page reads packs; exmat-runtime pack ${bundle} -o ${bundle.slice(0, -3)}.exmat makes one`);
+    say(`${names.join(", ")}: expected a pack (.exmat), a scene (.json) with its packs, or a motion (.glb)`);
   } catch (error) {
     say(error.message);
   }
@@ -350,6 +385,7 @@ function drawFrame(now) {
     drawHands();
     if (frames++ % 6 === 0) tell();
   }
+  if (state.motion !== null && !state.paused) state.motion.mixer.update(elapsed / 1000);
   renderer.render(picture, camera);
   requestAnimationFrame(drawFrame);
 }

@@ -345,12 +345,40 @@ test("memory is flat over 10,000 frames", (t) => visit({}, async (page, context)
   assert.ok(grown < 1e6);
 }));
 
+const dropOn = (page, files) => page.evaluate((given) => {
+  const transfer = new DataTransfer();
+  for (const [name, data] of given) transfer.items.add(new File([Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0))], name));
+  dispatchEvent(new DragEvent("drop", { dataTransfer: transfer, bubbles: true, cancelable: true }));
+}, files.map(([name, bytes]) => [name, Buffer.from(bytes).toString("base64")]));
+
+test("a motion is dropped, and a scene follows it", () => visit({}, async (page) => {
+  await dropOn(page, [["run.glb", readFileSync(process.env.EXMAT_PACKS + "/character.glb")]]);
+  await page.waitForFunction(() => window.exmat.state.motion?.mixer.time > 0.5);
+  const weights = () => page.evaluate(() => {
+    const found = [];
+    window.exmat.state.motion.scene.traverse((node) => found.push(...(node.morphTargetInfluences ?? [])));
+    return found;
+  });
+  const before = await weights();
+  await page.waitForFunction((from) => window.exmat.state.motion.mixer.time > from, await page.evaluate(() => window.exmat.state.motion.mixer.time + 0.3));
+  const after = await weights();
+  assert.ok(before.length > 1 && before.some((weight, i) => weight !== after[i]), "the flesh moves on its bones");
+  assert.equal(await page.locator("#weights-plot").isVisible(), false);
+  await picture(page, "motion");
+  await page.click("#pause");
+  await page.click("#reset");
+  assert.equal(await page.evaluate(() => window.exmat.state.motion.mixer.time), 0);
+  await page.click("#pause");
+  await page.click("text=teddy");
+  await loaded(page, "teddy");
+  assert.equal(await page.evaluate(() => window.exmat.state.motion), null);
+  assert.ok(await page.locator("#weights-plot").isVisible());
+  await dropOn(page, [["hero.h5", "bytes"]]);
+  await page.waitForFunction(() => /exmat-runtime pack hero\.h5 -o hero\.exmat/.test(document.getElementById("message").textContent));
+}));
+
 test("a pack is dropped, and a scene with its pack", () => visit({}, async (page) => {
-  const drop = (files) => page.evaluate((given) => {
-    const transfer = new DataTransfer();
-    for (const [name, data] of given) transfer.items.add(new File([Uint8Array.from(atob(data), (letter) => letter.charCodeAt(0))], name));
-    dispatchEvent(new DragEvent("drop", { dataTransfer: transfer, bubbles: true, cancelable: true }));
-  }, files.map(([name, bytes]) => [name, Buffer.from(bytes).toString("base64")]));
+  const drop = (files) => dropOn(page, files);
   const bar = readFileSync(process.env.EXMAT_PACKS + "/falling.exmat");
   await drop([["falling.exmat", bar]]);
   await loaded(page, "falling.exmat");
