@@ -3,6 +3,7 @@
 What a user calls his own stands in capitals (SCENE.json, DIR/report.html, NN_name) and is no reference.
 """
 import builtins
+import os
 import re
 import subprocess
 from functools import lru_cache
@@ -24,6 +25,7 @@ LINK = re.compile(r"\]\(([^)\s]+)\)")
 QUOTED = re.compile(r"`[^`\n]+`")
 CODE = re.compile(QUOTED.pattern + r"|^ {4}.*(?:\n +[\[-].*)*|^```.*?\n(?s:.*?)^```$", re.M)  # of a page: with blocks, and lines that go on
 PLACEHOLDER = re.compile(r"(^|/|_)(NN|[A-Z]{3,}|[A-Z]+_\w+|NAME)\b|NN_name|(^|/)x\.\w+$")
+SCRIPT = re.compile(r"(?:^ {4}|`|&& )((?:examples|tests)/[\w./-]+\w) +[A-Z\-\w]", re.M)
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
 # Names of ours in a page's code: of the C interface, of options and of types and tests.
 SYMBOL = re.compile(r"(?<![\w./<:*-])(exmat_[a-z]\w*[a-z0-9]|EXMAT_[A-Z]\w*[A-Z0-9]|k?[A-Z][a-z0-9]+(?:[A-Z][a-z0-9]*)+)(?![\w*.-])")
@@ -206,6 +208,15 @@ def command_faults(root, text, code_of):
                     yield code.start() + call.start(), f"{call.group(1)} has no option {option}"
 
 
+def script_faults(root, text):
+    """Of scripts that a page calls by their paths and with arguments."""
+    for code in CODE.finditer(text):
+        for match in SCRIPT.finditer(code.group()):
+            script = root / match.group(1)
+            if script.is_file() and not os.access(script, os.X_OK):
+                yield code.start() + match.start(), f"{match.group(1)} is not executable"
+
+
 def references(root):
     """Comments and pages name pages, sections, files and commands that exist."""
     names = files_of(root)
@@ -217,7 +228,7 @@ def references(root):
         page = path.suffix == ".md"
         outside_code = FENCE.sub(lambda m: blank(m.group()), text) if page else text
         found = [*page_faults(root, path.parent if page else None, outside_code), *path_faults(root, outside_code, names), *command_faults(root, text, CODE if page else QUOTED),
-                 *(relative_faults(path, outside_code) if page else ()), *(link_faults(path, outside_code) if page else ()),
+                 *(relative_faults(path, outside_code) if page else ()), *(link_faults(path, outside_code) if page else ()), *(script_faults(root, text) if page else ()),
                  *(message_faults(root, outside_code) if page else ()), *(symbol_faults(root, outside_code) if page and name != "CHANGELOG.md" else ())]
         for position, what in sorted(found):
             yield f"{name}:{text.count(chr(10), 0, position) + 1}: {what}"

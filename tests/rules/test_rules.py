@@ -89,6 +89,7 @@ PLANTED = [
     ("references", "tests/x.py", '"""As tests/nowhere does."""\n'),
     ("references", "tests/x.sh", "#!/bin/sh\n# As tests/{x.sh,nowhere} do.\n"),
     ("references", "docs/page.md", "Do\n\n    ../tools/nowhere.py\n"),
+    ("references", "tests/page.md", "Do\n\n    tests/page.md --write\n"),
     ("references", "docs/page.md", "[words](nowhere.md)\n"),
     ("references", "docs/page.md", "# Page\n[words](page.md#two)\n"),
     ("references", "docs/page.md", "# Page\n[words](#two)\n"),
