@@ -68,7 +68,7 @@ class LaneStep {
         reports[l] = step(model_, *body.scene, *body.state, own);
         continue;
       }
-      if (is_near(l)) {
+      if (meets(l)) {
         finish_contact(model_, *body.state, reports_[l].status == NewtonStatus::kConverged, own.near->contact.torque,
                        own);
       } else {
@@ -104,7 +104,7 @@ class LaneStep {
   Profile* profile() const noexcept { return own_.front()->profile; }
 
   /// True for a body near obstacles, after start_contacts().
-  bool is_near(std::size_t l) const noexcept { return l < bodies_.size() && contacts_[l].has_value(); }
+  bool meets(std::size_t l) const noexcept { return l < bodies_.size() && contacts_[l].has_value(); }
   /// The unknowns of all lanes: r modes, then those of frames near obstacles.
   Eigen::Index unknowns() const noexcept { return model_.modes() + rigid_; }
   LaneVectors rigid(AlignedArray& array) const { return {array.data() + model_.modes() * kLanes, kLanes, rigid_}; }
@@ -143,12 +143,13 @@ class LaneStep {
       own.q = q_.row(lane).matrix();
       start_contact(model_, *body.scene, *body.state, own);
       contacts_[l].emplace(model_, *body.state, steps_[l]->potential(), own);
+      frames().begin_contact(lane);
       rigid_ = model_.frame->rigid_unknowns();
     });
     for (AlignedArray* const array : {&workspace_.q_, &workspace_.gradient_, &workspace_.trial_gradient_})
       rigid(*array).setZero();
     each([&](std::size_t l, Eigen::Index lane) {
-      if (is_near(l)) rigid(workspace_.q_).row(lane) = own_[l]->near->x.head(rigid_).transpose().array();
+      if (meets(l)) rigid(workspace_.q_).row(lane) = own_[l]->near->x.head(rigid_).transpose().array();
     });
   }
 
@@ -299,29 +300,24 @@ class LaneStep {
     there_.scale = external_norm_ + sums.col(2).sqrt() + forms_.acceleration_factor * sums.col(3).sqrt() +
                    rounding_ * sums.col(4).sqrt() / tolerance_;
     there_.residual = sums.col(5).sqrt();
+    each_meeting(chosen, [&](std::size_t l, Eigen::Index lane) { place(l, lane, at); });
     if (frames().exert_forces()) {
       there_.value += dot(frozen_, offset_);
-      const LaneNumbers flying = chosen * (1 - near());
-      if ((flying != 0).any()) {
-        const LaneNumbers found = frames().update(own(), flying, x, next_frozen_);
-        each([&](std::size_t, Eigen::Index lane) {
-          if (flying[lane] != 0 && found[lane] == 0) there_.value[lane] = kInfinity;
-        });
-      }
-    }
-    each_near(chosen, [&](std::size_t l, Eigen::Index lane) { place(l, lane, at); });
-    if (frames().exert_forces()) {
+      const LaneNumbers found = frames().update(own(), chosen, meeting(), x, next_frozen_);
+      each([&](std::size_t, Eigen::Index lane) {
+        if (chosen[lane] != 0 && found[lane] == 0) there_.value[lane] = kInfinity;
+      });
       gradient += next_frozen_;
       there_.residual = norm(gradient);
     }
-    each_near(chosen, [&](std::size_t l, Eigen::Index lane) { touch(l, lane, gradient_at); });
+    each_meeting(chosen, [&](std::size_t l, Eigen::Index lane) { touch(l, lane, gradient_at); });
   }
 
   /// The chosen of those near obstacles.
   template <class Work>
-  void each_near(const LaneNumbers& chosen, Work work) noexcept {
+  void each_meeting(const LaneNumbers& chosen, Work work) noexcept {
     each([&](std::size_t l, Eigen::Index lane) {
-      if (is_near(l) && chosen[lane] != 0) work(l, lane);
+      if (meets(l) && chosen[lane] != 0) work(l, lane);
     });
   }
 
@@ -334,21 +330,17 @@ class LaneStep {
     for (Eigen::Index k = 0; k < rigid_; ++k) x[k] = at[(model_.modes() + k) * kLanes + lane];
     for (Eigen::Index c = 0; c < model_.modes(); ++c) x[rigid_ + c] = at[c * kLanes + lane] - start_(lane, c);
     placements_[l] = contacts_[l]->place(x);
-    if (!frames().exert_forces()) return;
-    const StepForm& form = own.form;
-    model_.frame->update_force(own.near->q, form.velocity_factor, form.velocity_centre, own.frame);
-    next_frozen_.row(lane) = -model_.frame->force(own.frame)->transpose().array();
   }
 
   /// Adds what obstacles and the motion of the frame do there.
   void touch(std::size_t l, Eigen::Index lane, AlignedArray& gradient_at) noexcept {
-    ContactProblemWorkspace& near = *own_[l]->near;
+    ContactProblemWorkspace& own = *own_[l]->near;
     LaneVectors gradient = vectors(gradient_at);
-    near.gradient_q = gradient.row(lane).matrix();
+    own.gradient_q = gradient.row(lane).matrix();
     contacts_[l]->evaluate_outside(pose(l));
-    Eigen::VectorXd& whole = near.newton.trial_gradient;
+    Eigen::VectorXd& whole = own.newton.trial_gradient;
     const PotentialEvaluation found =
-        contacts_[l]->finish(near.x, {{there_.value[lane], there_.magnitude[lane]}, there_.scale[lane]}, whole);
+        contacts_[l]->finish(own.x, {{there_.value[lane], there_.magnitude[lane]}, there_.scale[lane]}, whole);
     there_.value[lane] = found.potential.value;
     there_.magnitude[lane] = found.potential.magnitude;
     there_.scale[lane] = found.force_scale;
@@ -359,32 +351,23 @@ class LaneStep {
 
   /// Adds the same to a lane's Hessian at the iterate, where its last evaluation was.
   void stiffen(std::size_t l, Eigen::Index lane, AlignedArray& hessians) noexcept {
-    Workspace& own = *own_[l];
-    ContactProblemWorkspace& near = *own.near;
-    const Eigen::Index modes = model_.modes();
-    Eigen::MatrixXd& elastic = own.newton.hessian;
-    for (Eigen::Index i = 0; i < modes; ++i)
-      for (Eigen::Index j = 0; j <= i; ++j) {
-        const Eigen::Index at = lane_entry(i, j) + lane;
-        elastic(i, j) = workspace_.stiffness_[at] + workspace_.quadratic_[at];
-      }
-    model_.frame->add_stiffness(own.form.velocity_factor, own.frame, elastic);
-    contacts_[l]->start_stiffness(pose(l));
-    Eigen::MatrixXd& whole = near.newton.hessian;
-    contacts_[l]->finish_hessian(pose(l), near.x, whole);
-    for (Eigen::Index i = 0; i < modes; ++i)
-      for (Eigen::Index j = 0; j <= i; ++j) hessians[lane_entry(i, j) + lane] = whole(rigid_ + i, rigid_ + j);
-    for (Eigen::Index k = 0; k < rigid_; ++k) {
-      for (Eigen::Index j = 0; j < modes; ++j) hessians[lane_entry(modes + k, j) + lane] = whole(rigid_ + j, k);
-      for (Eigen::Index m = 0; m <= k; ++m) hessians[lane_entry(modes + k, modes + m) + lane] = whole(k, m);
+    ContactProblemWorkspace& own = *own_[l]->near;
+    Eigen::Matrix3d turn;
+    if (rigid_ > 0) turn = model_.frame->turn_to_world(own.x, placements_[l]);
+    model_.contact->sum_squares(static_cast<int>(rigid_), rigid_ > 0 ? &turn : nullptr, pose(l), own.contact);
+    const double* const squares = own.contact.squares.data();
+    const Eigen::Index width = padded(unknowns());
+    for (Eigen::Index i = 0; i < unknowns(); ++i) {
+      double* const row = hessians.data() + lane_entry(i, 0) + lane;
+      for (Eigen::Index j = 0; j <= i; ++j) row[lane_entry(0, j)] += squares[j * width + i];
     }
   }
 
   /// 1 for those near obstacles.
-  LaneNumbers near() const noexcept {
+  LaneNumbers meeting() const noexcept {
     LaneNumbers numbers;
     for (std::size_t l = 0; l < static_cast<std::size_t>(kLanes); ++l)
-      numbers[static_cast<Eigen::Index>(l)] = is_near(l) ? 1 : 0;
+      numbers[static_cast<Eigen::Index>(l)] = meets(l) ? 1 : 0;
     return numbers;
   }
 
@@ -404,14 +387,14 @@ class LaneStep {
       kernels().lanes_take(model_.modes(), chosen.data(), next_frozen_.data(), frozen_.data());
     }
     each([&](std::size_t l, Eigen::Index lane) {
-      if (is_near(l) && chosen[lane] != 0) there_.value[lane] += model_.frame->accept_rigid(own_[l]->frame);
+      if (meets(l) && chosen[lane] != 0) there_.value[lane] += model_.frame->accept_rigid(own_[l]->frame);
     });
   }
 
   /// Factors of the Hessians of those that have none, from `stiffness_`.
   void factorise() noexcept {
-    const Eigen::Index modes = model_.modes();
-    const StageTimer timer(profile(), Stage::kSolve, flops(static_cast<double>(modes * modes * modes) / 3));
+    const Eigen::Index modes = model_.modes(), size = unknowns();
+    const StageTimer timer(profile(), Stage::kSolve, flops(static_cast<double>(size * size * size) / 3));
     // No factor is to be kept where all need one.
     const bool keeps = any(Hessian::kFactorised);
     fetch_next();
@@ -422,32 +405,30 @@ class LaneStep {
     each([&](std::size_t l, Eigen::Index lane) {
       if (state_[l] == Hessian::kFactorised) fresh[lane] = 0;
     });
-    const LaneNumbers flying = fresh * (1 - near());
-    if (frames().exert_forces() && (flying != 0).any()) frames().add_stiffness(own(), flying, factor);
-    for (Eigen::Index k = 0; k < rigid_; ++k)
-      for (Eigen::Index j = 0; j <= modes + k; ++j) entry(factor, modes + k, j) = LaneNumbers::Constant(j == modes + k);
+    if (frames().exert_forces()) frames().add_stiffness(own(), fresh, meeting(), factor);
+    if (rigid_ > 0) frames().set_rigid_rows(own(), meeting(), factor);
     each([&](std::size_t l, Eigen::Index lane) {
-      if (is_near(l) && fresh[lane] != 0) stiffen(l, lane, factor);
+      if (meets(l) && fresh[lane] != 0) stiffen(l, lane, factor);
     });
-    kernels().lanes_cholesky(factor.data(), unknowns());
+    kernels().lanes_cholesky(factor.data(), size);
     each([&](std::size_t l, Eigen::Index lane) {
       if (fresh[lane] == 0) return;
       ++reports_[l].factorisations;
-      alone_[l] = !std::isfinite(entry(factor, unknowns() - 1, unknowns() - 1)[lane]);
+      alone_[l] = !std::isfinite(entry(factor, size - 1, size - 1)[lane]);
     });
     if (keeps)
-      kernels().lanes_take(lane_triangle(unknowns()) / kLanes, fresh.data(), factor.data(), workspace_.factor_.data());
+      kernels().lanes_take(lane_triangle(size) / kLanes, fresh.data(), factor.data(), workspace_.factor_.data());
   }
 
   void find_direction() noexcept {
-    const Eigen::Index modes = model_.modes();
-    const StageTimer timer(profile(), Stage::kSolve, flops(2.0 * static_cast<double>(modes * modes)));
+    const Eigen::Index size = unknowns();
+    const StageTimer timer(profile(), Stage::kSolve, flops(2.0 * static_cast<double>(size * size)));
     direction_ = -gradient_;
     rigid(workspace_.direction_) = -rigid(workspace_.gradient_);
     fetch_next();
-    kernels().lanes_cholesky_solve(workspace_.factor_.data(), unknowns(), direction_.data());
+    kernels().lanes_cholesky_solve(workspace_.factor_.data(), size, direction_.data());
     if (frames().exert_forces()) add_gyroscopic_terms();
-    slope_ = runtime::dot(unknowns(), gradient_.data(), direction_.data());
+    slope_ = runtime::dot(size, gradient_.data(), direction_.data());
   }
 
   /// As solve_direction() of newton.h; a part that is not weak is left to step(). Near obstacles there is none.
@@ -455,7 +436,7 @@ class LaneStep {
     const LaneNumbers ratios = frames().gyroscopic_ratios(own());
     LaneNumbers terms = LaneNumbers::Zero();
     each([&](std::size_t l, Eigen::Index lane) {
-      if (is_near(l)) return;
+      if (meets(l)) return;
       if (IncrementalPotential::is_weak(ratios[lane]))
         terms[lane] = IncrementalPotential::gyroscopic_terms(ratios[lane]);
       else
@@ -502,7 +483,7 @@ class LaneStep {
     assemble(workspace_.q_, chosen, workspace_.trial_gradient_);
     const LaneNumbers residual = there_.residual;
     accept(chosen);
-    each_near(chosen, [&](std::size_t l, Eigen::Index lane) {
+    each_meeting(chosen, [&](std::size_t l, Eigen::Index lane) {
       take_evaluation(lane);
       reports_[l] = {};
       reports_[l].residual = residual[lane];
@@ -531,7 +512,7 @@ class LaneStep {
     each([&](std::size_t l, Eigen::Index lane) {
       NewtonReport& report = reports_[l];
       if (std::isfinite(unchecked_from_[l]) && !(report.residual <= unchecked_from_[l])) {
-        if (is_near(l)) {  // its contacts would have to go back, too
+        if (meets(l)) {  // its contacts would have to go back, too
           alone_[l] = true;
           return;
         }
@@ -553,10 +534,10 @@ class LaneStep {
         return;
       }
       report.status = *reason;
-      done_[l] = !is_near(l) || ends_rounds(l);
+      done_[l] = !meets(l) || ends_rounds(l);
       if (!done_[l]) again[lane] = 1;
     });
-    if (frames().exert_forces() && (returned != 0).any()) frames().update(own(), returned, q_, next_frozen_);
+    if (frames().exert_forces() && (returned != 0).any()) frames().update(own(), returned, meeting(), q_, next_frozen_);
     return again;
   }
 
