@@ -245,22 +245,26 @@ Obstacle solid(const Shape& shape, double friction = 0) {
   return obstacle;
 }
 
-/// What a body of a crowd may meet, and where it begins above the origin.
+enum class Frame { kFree, kClamped, kCarried };
+
+/// What a body of a crowd may meet.
 struct Ground {
   std::string name;
   Obstacles obstacles;
-  bool free = true;
+  Frame frame = Frame::kFree;
 };
 
 std::vector<Ground> grounds() {
   const Plane floor{Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitZ()};
+  const Plane below{Eigen::Vector3d(0, 0, -0.01), Eigen::Vector3d::UnitZ()};
   const Plane slope{Eigen::Vector3d::Zero(), Eigen::Vector3d(0.2, 0.1, 1).normalized()};
   const Box box{Eigen::Vector3d(0.1, 0, -1), Eigen::Vector3d(0.6, 0.5, 1)};
   const Sphere sphere{Eigen::Vector3d(0.05, 0, -2), 2};
   Obstacle lift = solid(floor, 0.5);
   lift.motion = RigidMotion::going_on(0, {.linear_velocity = Eigen::Vector3d(0.1, 0, 0.2)});
   return {{"floor", {solid(floor)}},
-          {"clamped_floor", {solid(Plane{Eigen::Vector3d(0, 0, -0.01), Eigen::Vector3d::UnitZ()}, 0.3)}, false},
+          {"clamped_floor", {solid(below, 0.3)}, Frame::kClamped},
+          {"carried_floor", {solid(below, 0.3)}, Frame::kCarried},
           {"slope", {solid(slope, 0.6)}},
           {"slippery_slope", {solid(slope, 0.1)}},
           {"box", {solid(box, 0.4)}},
@@ -287,12 +291,17 @@ Crowd crowd_above(const Ground& ground, const Bar& bar, const Model& model, std:
                 .angular_velocity = Eigen::Vector3d(0.3, 1, 0.2)},
                state);
     prepare_contacts(model, ground.obstacles.size(), state);
+    if (ground.frame != Frame::kCarried) continue;
+    const Eigen::Quaterniond tilted(Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY()));
+    scene.carrier = RigidMotion(std::vector<Keyframe>{{}, {0.4, Eigen::Vector3d(0, 0, -0.05), tilted}});
+    Workspace workspace(model, scene);
+    follow_frame(model, scene, state, workspace);
   }
   return crowd;
 }
 
-Bar touching_bar(bool free) {
-  Bar bar = test::make_bar({.free = free});
+Bar touching_bar(Frame frame) {
+  Bar bar = test::make_bar({.free = frame == Frame::kFree, .carried = frame == Frame::kCarried});
   bar.model.contact = test::surface_contact(bar.model);
   return bar;
 }
@@ -300,8 +309,8 @@ Bar touching_bar(bool free) {
 // Falls, impacts and the rest after them: 400 steps of bodies that are near obstacles and of others beside them.
 TEST(LaneStep, MovesBodiesNearObstaclesAsOneByOne) {
   for (const Ground& ground : grounds()) {
-    const Bar bar = touching_bar(ground.free);
-    const auto model = prepared(bar);
+    const Bar bar = touching_bar(ground.frame);
+    const auto model = prepared(bar, {.carried = ground.frame == Frame::kCarried});
     Crowd lanes = crowd_above(ground, bar, *model, 8), each = lanes;
     LaneWorkspace workspace(*model, lanes.scenes.front());
     std::vector<StepReport> reports(8), expected(8);
@@ -328,10 +337,35 @@ TEST(LaneStep, MovesBodiesNearObstaclesAsOneByOne) {
   }
 }
 
+// Stiffness in single precision, which the residual is not.
+TEST(LaneStep, MixedPrecisionMovesBodiesNearObstaclesAsDouble) {
+  const Bar bar = touching_bar(Frame::kFree);
+  const auto model = prepared(bar);
+  Crowd mixed = crowd_above(grounds().front(), bar, *model, 8);
+  for (StepScene& scene : mixed.scenes) scene.stiffness_damping = 0;
+  Crowd exact = mixed;
+  for (StepScene& scene : mixed.scenes) scene.precision = Precision::kMixed;
+  LaneWorkspace workspace(*model, mixed.scenes.front());
+  std::vector<StepReport> reports(8), expected(8);
+  int contacts = 0;
+  for (int n = 0; n < 200; ++n) {
+    step_in_lanes(*model, mixed.bodies(), workspace, reports);
+    step_in_lanes(*model, exact.bodies(), workspace, expected);
+    for (std::size_t i = 0; i < 8; ++i) {
+      EXPECT_EQ(reports[i].contacts, expected[i].contacts) << "body " << i << ", step " << n;
+      contacts += expected[i].contacts;
+    }
+  }
+  EXPECT_GT(contacts, 0);
+  for (std::size_t i = 0; i < 8; ++i)
+    EXPECT_LE(difference(*model, exact.states[i], mixed.states[i]), 1e-8) << "body " << i;
+  EXPECT_GT(difference(*model, exact.states[0], mixed.states[0]), 0) << "it is the same";
+}
+
 // Those near an obstacle and those that are not have each the same numbers beside any others.
 TEST(LaneStep, NoBodyNearObstaclesDependsOnTheOthers) {
   const Ground ground = grounds()[2];
-  const Bar bar = touching_bar(true);
+  const Bar bar = touching_bar(Frame::kFree);
   const auto model = prepared(bar);
   const Crowd crowd = crowd_above(ground, bar, *model, 8);
   Crowd all = crowd, few;
@@ -366,7 +400,7 @@ TEST(LaneStep, IsForWhatItKnows) {
 }
 
 TEST(LaneStep, AllocatesNothingNearObstacles) {
-  const Bar bar = touching_bar(true);
+  const Bar bar = touching_bar(Frame::kFree);
   const auto model = prepared(bar);
   Crowd crowd = crowd_above(grounds()[2], bar, *model, 8);
   const auto bodies = crowd.bodies();
