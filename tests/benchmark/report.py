@@ -212,16 +212,17 @@ def report_crowds(result):
 
 
 def worlds(result):
-    cells = {"stacks": "stacks of five", "heap": "stacks that lean on each other"}
+    cells = {"apart": ("on the floor, apart", (8, 200)), "stacks": ("stacks of five", (5, 100)), "heap": ("stacks that lean on each other", (5, 100))}
     rows = [("a body on the floor, alone", 1, "", number(result.microseconds("world/alone")), ""),
             ("two on each other", 2, "2", number(result.microseconds("world/pair") / 2), "")]
-    for kind, words in cells.items():
-        for count in (5, 100):
+    for kind, (words, counts) in cells.items():
+        for count in counts:
             names = [f"world/{kind}/threads{threads}/{count}" for threads in (1, 2)]
             if names[0] not in result.best:
                 continue
             per_body = [number(result.microseconds(name) / count) if name in result.best else "" for name in names]
-            rows.append((words, f"{count:,}", f"{result.best[names[0]]['largest_island']:,.0f}", *per_body))
+            largest = result.best[names[0]]["largest_island"]
+            rows.append((words, f"{count:,}", f"{largest:,.0f}" if largest > 0 else "", *per_body))
     return table(("", "bodies", "largest island", "1 thread", "2 threads"), rows)
 
 

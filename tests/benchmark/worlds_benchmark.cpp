@@ -58,6 +58,13 @@ std::vector<WorldBodyStart> piles(const Blocks& blocks, int count, double spacin
   return bodies;
 }
 
+/// On the floor, out of reach of each other.
+std::vector<WorldBodyStart> apart(const Blocks& blocks, int count) {
+  std::vector<WorldBodyStart> bodies;
+  for (int i = 0; i < count; ++i) bodies.push_back(blocks.body({0.8 * (i % 20), 0.5 * (i / 20), 0.001}));
+  return bodies;
+}
+
 }  // namespace
 
 void register_worlds() {
@@ -82,6 +89,16 @@ void register_worlds() {
     const Blocks blocks = falling_blocks();
     time_world(state, {blocks.body({0, 0, 0.001}), blocks.body({0.02, 0.01, 0.202})}, 500, 1);
   })->Iterations(2000);
+  for (const int threads : {1, 2})
+    for (const int count : {8, 200})
+      add("world/apart/threads" + std::to_string(threads) + "/" + std::to_string(count),
+          [=](::benchmark::State& state) {
+            omp_set_num_threads(threads);
+            const Blocks blocks = falling_blocks();
+            time_world(state, apart(blocks, count), 500, threads);
+          })
+          ->UseRealTime()
+          ->Iterations(200);  // settled once
   for (const int threads : {1, 2})
     for (const int count : {5, 100})
       for (const bool close : {false, true}) {

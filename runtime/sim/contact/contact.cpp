@@ -417,7 +417,12 @@ double ContactSet::refresh_friction(ContactWorkspace& workspace) const noexcept 
 }
 
 /// The factors of a batch, r of each by the rows of its vertex and then its rigid ones, and their squares; empties it.
-void ContactSet::add_squares(int rigid, Batch& batch, ContactWorkspace& workspace) const noexcept {
+void ContactSet::add_squares(int rigid, const Eigen::Matrix3d* turn, Batch& batch,
+                             ContactWorkspace& workspace) const noexcept {
+  if (turn != nullptr) {
+    auto torques = batch.rigid.bottomRows<3>().leftCols(batch.count);
+    torques = (turn->transpose() * torques).eval();
+  }
   const Eigen::Index width = padded(rigid + modes());
   kernels().vertex_loads(rows_.data(), rows_.stride(), batch.vertices.data(), batch.count, batch.vectors.data(),
                          workspace.factors.data(), width);
@@ -430,14 +435,14 @@ void ContactSet::add_squares(int rigid, Batch& batch, ContactWorkspace& workspac
   batch.count = 0;
 }
 
-void ContactSet::add_stiffness_of(int rigid, const BodyPose& pose, ContactWorkspace& workspace,
-                                  Eigen::MatrixXd& stiffness) const noexcept {
+void ContactSet::sum_squares(int rigid, const Eigen::Matrix3d* turn, const BodyPose& pose,
+                             ContactWorkspace& workspace) const noexcept {
   const Eigen::Index width = padded(rigid + modes());
   std::fill_n(workspace.squares.data(), width * width, 0.0);
   Batch batch;
   static_assert(kBatch >= kPlaneFactors);
   for (std::size_t panel = 0; workspace.are_all_planes && panel < workspace.planes.panels().size(); ++panel) {
-    if (batch.count + kPlaneFactors > kBatch) add_squares(rigid, batch, workspace);
+    if (batch.count + kPlaneFactors > kBatch) add_squares(rigid, turn, batch, workspace);
     const auto begin = static_cast<std::size_t>(batch.count);
     batch.count +=
         static_cast<int>(workspace.planes.factors(panel, pose, batch.vectors.col(batch.count).data(),
@@ -451,10 +456,16 @@ void ContactSet::add_stiffness_of(int rigid, const BodyPose& pose, ContactWorksp
       batch.rigid.col(batch.count) << direction, candidate.arm.cross(direction);
       batch.vectors.col(batch.count) = pose.rotation.transpose() * direction;
       batch.add(candidate.vertex, workspace.loaded[i]);
-      if (batch.full()) add_squares(rigid, batch, workspace);
+      if (batch.full()) add_squares(rigid, turn, batch, workspace);
     }
   }
-  add_squares(rigid, batch, workspace);
+  add_squares(rigid, turn, batch, workspace);
+}
+
+void ContactSet::add_stiffness_of(int rigid, const BodyPose& pose, ContactWorkspace& workspace,
+                                  Eigen::MatrixXd& stiffness) const noexcept {
+  sum_squares(rigid, nullptr, pose, workspace);
+  const Eigen::Index width = padded(rigid + modes());
   const Eigen::Map<const RowMatrix> upper(workspace.squares.data(), width, width);
   for (Eigen::Index j = 0; j < modes(); ++j) {
     const Eigen::Index below = modes() - j;

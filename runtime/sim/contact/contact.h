@@ -166,6 +166,12 @@ class ContactSet {
   void add_reduced_stiffness(const BodyPose& pose, ContactWorkspace& workspace,
                              Eigen::MatrixXd& stiffness) const noexcept;
 
+  /// The same as a sum of squares alone, into workspace.squares: its upper triangle by rows [padded(r + rigid)] of the
+  /// r coordinates and then of 6 or 0 `rigid` unknowns, whose last three turn the body about world axes by `turn` times
+  /// them, or as they are where that is null.
+  void sum_squares(int rigid, const Eigen::Matrix3d* turn, const BodyPose& pose,
+                   ContactWorkspace& workspace) const noexcept;
+
   /// Writes the contacts of the last evaluation, anchors moved where they slid; the candidates are complete after it.
   void commit(const BodyPose& pose, ContactWorkspace& workspace, ContactState& state) const noexcept;
 
@@ -198,7 +204,7 @@ class ContactSet {
   void evaluate_each(const BodyPose& pose, double way, bool is_first, ContactWorkspace& workspace) const noexcept;
   void evaluate_batch(const BodyPose& pose, bool is_first, Batch& batch, ContactWorkspace& workspace) const noexcept;
   double potential_of(const BodyPose& pose, Batch& batch, ContactWorkspace& workspace) const noexcept;
-  void add_squares(int rigid, Batch& batch, ContactWorkspace& workspace) const noexcept;
+  void add_squares(int rigid, const Eigen::Matrix3d* turn, Batch& batch, ContactWorkspace& workspace) const noexcept;
   void find_sweeping(const BodyPose& pose, ContactWorkspace& workspace) const noexcept;
   bool is_near(int node, const BodyPose& pose, double q_norm, double margin,
                const ContactWorkspace& workspace) const noexcept;

@@ -4,6 +4,7 @@ namespace exmat::runtime {
 namespace {
 
 const FreeMotionWorkspace& free_motion(const Workspace& body) { return *std::get_if<FreeMotionWorkspace>(&body.frame); }
+FreeMotionWorkspace& free_motion(Workspace& body) { return *std::get_if<FreeMotionWorkspace>(&body.frame); }
 
 template <class Work>
 void each(std::span<Workspace* const> bodies, const LaneNumbers& chosen, Work work) {
@@ -28,12 +29,25 @@ void LaneFrames::begin(const LaneNumbers& velocity_factor, const LaneVectors& ve
   if (rotation_) rotation_->begin(velocity_factor, velocity_centre);
 }
 
-LaneNumbers LaneFrames::update(std::span<Workspace* const> bodies, const LaneNumbers& chosen, const LaneVectors& q,
-                               LaneVectors& gradient) noexcept {
+void LaneFrames::begin_contact(Eigen::Index lane) noexcept {
+  if (rotation_) rotation_->begin_given(lane);
+}
+
+LaneNumbers LaneFrames::update(std::span<Workspace* const> bodies, const LaneNumbers& chosen,
+                               const LaneNumbers& meeting, const LaneVectors& q, LaneVectors& gradient) noexcept {
   LaneNumbers found = LaneNumbers::Ones();
   if (rotation_) {
-    found = rotation_->update(chosen, q, gradient);
+    const LaneNumbers given = chosen * meeting;
+    each(bodies, given, [&](Workspace& own, Eigen::Index lane) { rotation_->give(lane, free_motion(own)); });
+    found = (given != 0).select(found, rotation_->update(chosen - given, q, gradient));
     gradient = -gradient;
+    each(bodies, given, [&](Workspace& own, Eigen::Index lane) {
+      FreeMotionWorkspace& free = free_motion(own);
+      rotation_->take(lane, free);
+      free.moments.inertia = rotation_->inertia(lane);
+      own.q = q.row(lane).matrix();
+      free.velocity = own.form.velocity_factor * (own.q - own.form.velocity_centre);
+    });
     return found;
   }
   each(bodies, chosen, [&](Workspace& own, Eigen::Index lane) {
@@ -45,9 +59,9 @@ LaneNumbers LaneFrames::update(std::span<Workspace* const> bodies, const LaneNum
 }
 
 void LaneFrames::add_stiffness(std::span<Workspace* const> bodies, const LaneNumbers& chosen,
-                               AlignedArray& hessian) noexcept {
+                               const LaneNumbers& meeting, AlignedArray& hessian) noexcept {
   if (rotation_) {
-    rotation_->add_stiffness(chosen, hessian);
+    rotation_->add_stiffness(chosen * (1 - meeting), hessian);
     return;
   }
   each(bodies, chosen, [&](Workspace& own, Eigen::Index lane) {
@@ -55,6 +69,27 @@ void LaneFrames::add_stiffness(std::span<Workspace* const> bodies, const LaneNum
     frame_->add_stiffness(own.form.velocity_factor, own.frame, stiffness_);
     for (Eigen::Index j = 0; j < stiffness_.cols(); ++j)
       for (Eigen::Index i = j; i < stiffness_.rows(); ++i) hessian[lane_entry(i, j) + lane] += stiffness_(i, j);
+  });
+}
+
+void LaneFrames::set_rigid_rows(std::span<Workspace* const> bodies, const LaneNumbers& meeting,
+                                AlignedArray& hessian) const noexcept {
+  const DeformingInertia& inertia = *frame_->inertia_of_momenta();
+  const Eigen::Index modes = inertia.modes(), turn = modes + 3;
+  for (Eigen::Index row = modes; row < modes + frame_->rigid_unknowns(); ++row)
+    for (Eigen::Index column = 0; column <= row; ++column)
+      for (Eigen::Index lane = 0; lane < kLanes; ++lane)
+        hessian[lane_entry(row, column) + lane] = row == column && meeting[lane] == 0 ? 1 : 0;
+  each(bodies, meeting, [&](const Workspace& own, Eigen::Index lane) {
+    const FreeMotionWorkspace& free = free_motion(own);
+    const double factor = free.unknowns.velocity_factor() * free.unknowns.velocity_factor();
+    for (Eigen::Index c = 0; c < 3; ++c) {
+      hessian[lane_entry(modes + c, modes + c) + lane] = factor * inertia.mass();
+      for (Eigen::Index j = 0; j < modes; ++j)
+        hessian[lane_entry(turn + c, j) + lane] = factor * free.moments.deformation()(j, c);
+      for (Eigen::Index d = 0; d <= c; ++d)
+        hessian[lane_entry(turn + c, turn + d) + lane] = factor * free.moments.inertia(c, d);
+    }
   });
 }
 
@@ -79,7 +114,7 @@ void LaneFrames::gyroscopic_products(std::span<Workspace* const> bodies, const L
 }
 
 void LaneFrames::take(Eigen::Index lane, Workspace& body) const noexcept {
-  if (rotation_) rotation_->take(lane, *std::get_if<FreeMotionWorkspace>(&body.frame));
+  if (rotation_) rotation_->take(lane, free_motion(body));
 }
 
 }  // namespace exmat::runtime

@@ -23,12 +23,22 @@ class LaneFrames {
   /// Once the problems are set; velocities are c_v (q - q_v), numbers and vectors that stay.
   void begin(const LaneNumbers& velocity_factor, const LaneVectors& velocity_centre) noexcept;
 
-  // Functions of the lanes that are chosen (not zero).
+  /// A body near obstacles, after BodyFrame::begin_contact().
+  void begin_contact(Eigen::Index lane) noexcept;
+
+  // Functions of the lanes that are chosen (not zero). `meeting`: not zero for bodies near obstacles, which
+  // BodyFrame::place() has put where they are; what rigid_gradient() and end_contact() take is in their workspaces
+  // after update().
 
   /// `gradient` [r] = minus the forces at q; 1 where a frame has a motion for it, else 0.
-  LaneNumbers update(std::span<Workspace* const> bodies, const LaneNumbers& chosen, const LaneVectors& q,
-                     LaneVectors& gradient) noexcept;
-  void add_stiffness(std::span<Workspace* const> bodies, const LaneNumbers& chosen, AlignedArray& hessian) noexcept;
+  LaneNumbers update(std::span<Workspace* const> bodies, const LaneNumbers& chosen, const LaneNumbers& meeting,
+                     const LaneVectors& q, LaneVectors& gradient) noexcept;
+  void add_stiffness(std::span<Workspace* const> bodies, const LaneNumbers& chosen, const LaneNumbers& meeting,
+                     AlignedArray& hessian) noexcept;
+  /// Sets the rows of rigid unknowns behind the modes, as add_rigid_hessian() without contacts; 1 in lanes that are not
+  /// near obstacles.
+  void set_rigid_rows(std::span<Workspace* const> bodies, const LaneNumbers& meeting,
+                      AlignedArray& hessian) const noexcept;
   LaneNumbers gyroscopic_ratios(std::span<Workspace* const> bodies) const noexcept;
   void gyroscopic_products(std::span<Workspace* const> bodies, const LaneNumbers& chosen, const LaneVectors& x,
                            LaneVectors& products) noexcept;

@@ -1,5 +1,7 @@
 #include "runtime/sim/lanes/lane_rotation.h"
 
+#include <Eigen/LU>
+
 namespace exmat::runtime {
 
 LaneRotation::LaneRotation(const DeformingInertia& inertia)
@@ -29,6 +31,15 @@ void LaneRotation::begin(const LaneNumbers& velocity_factor, const LaneVectors& 
   kernels().lanes_begin_rotation(arrays());
 }
 
+void LaneRotation::begin_given(Eigen::Index lane) noexcept {
+  for (Eigen::Index i = lane; i < factors_.size(); i += kLanes) factors_[i] = 0;
+}
+
+void LaneRotation::give(Eigen::Index lane, const FreeMotionWorkspace& body) noexcept {
+  spin_.row(lane) = body.solution.spin;
+  rotation_.row(lane) = body.solution.rotation;
+}
+
 LaneNumbers LaneRotation::update(const LaneNumbers& active, const LaneVectors& q, LaneVectors& force) noexcept {
   LaneNumbers found;
   kernels().lanes_rotate(arrays(), active.data(), q.data(), force.data(), found.data());
@@ -39,6 +50,7 @@ void LaneRotation::add_stiffness(const LaneNumbers& chosen, AlignedArray& hessia
   LaneNumbers softening;
   for (Eigen::Index lane = 0; lane < kLanes; ++lane)
     softening[lane] = DeformingInertia::softens(spin_.row(lane).matrix(), velocity_factor_[lane]) ? 1 : 0;
+  if ((chosen == 0).all() && (softening == 0).all()) return;
   kernels().lanes_rotation_stiffness(arrays(), chosen.data(), softening.data(), hessian.data());
 }
 
@@ -55,6 +67,11 @@ void LaneRotation::take(Eigen::Index lane, FreeMotionWorkspace& body) const noex
   const Eigen::Index modes = inertia_->modes();
   const double* own = products_.data() + 6 * modes * kLanes + lane;
   for (Eigen::Index i = 0; i < 3 * modes; ++i) body.moments.deformation().data()[i] = -own[i * kLanes];
+}
+
+Eigen::Matrix3d LaneRotation::inertia(Eigen::Index lane) const noexcept {
+  using Numbers = Eigen::Map<const Eigen::Matrix3d, Eigen::Unaligned, Eigen::Stride<3 * kLanes, kLanes>>;
+  return Numbers(inverse_inertia_.data() + lane).inverse();
 }
 
 LaneRotationArrays LaneRotation::arrays() noexcept {

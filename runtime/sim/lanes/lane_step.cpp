@@ -9,6 +9,7 @@
 
 #include "runtime/sim/lanes/fetch_ahead.h"
 #include "runtime/sim/step/body_step.h"
+#include "runtime/sim/step/contact_step.h"
 #include "runtime/sim/step/divided_step.h"
 #include "runtime/sim/step/example_forces.h"
 #include "runtime/sim/step/sleep.h"
@@ -57,6 +58,7 @@ class LaneStep {
       choose_first_iterate();
       find_targets();
       prepare();
+      start_contacts();
       minimise();
     }
     for (std::size_t l = 0; l < bodies_.size(); ++l) {
@@ -66,8 +68,13 @@ class LaneStep {
         reports[l] = step(model_, *body.scene, *body.state, own);
         continue;
       }
-      own.q = q_.row(static_cast<Eigen::Index>(l)).matrix();
-      frames().take(static_cast<Eigen::Index>(l), own);
+      if (meets(l)) {
+        finish_contact(model_, *body.state, reports_[l].status == NewtonStatus::kConverged, own.near->contact.torque,
+                       own);
+      } else {
+        own.q = q_.row(static_cast<Eigen::Index>(l)).matrix();
+        frames().take(static_cast<Eigen::Index>(l), own);
+      }
       steps_[l]->potential().set_elastic_energy(energy_[static_cast<Eigen::Index>(l)]);
       reports[l] = steps_[l]->finish(reports_[l]);
     }
@@ -76,6 +83,7 @@ class LaneStep {
  private:
   enum class Hessian { kEvaluated, kFactorised, kStale };
 
+  /// Of a and b, of r modes.
   LaneNumbers dot(const LaneVectors& a, const LaneVectors& b) const noexcept {
     return runtime::dot(model_.modes(), a.data(), b.data());
   }
@@ -94,6 +102,12 @@ class LaneStep {
   LaneFrames& frames() const noexcept { return workspace_.frames_; }
   std::span<Workspace* const> own() const noexcept { return std::span(own_).first(bodies_.size()); }
   Profile* profile() const noexcept { return own_.front()->profile; }
+
+  /// True for a body near obstacles, after start_contacts().
+  bool meets(std::size_t l) const noexcept { return l < bodies_.size() && contacts_[l].has_value(); }
+  /// The unknowns of all lanes: r modes, then those of frames near obstacles.
+  Eigen::Index unknowns() const noexcept { return model_.modes() + rigid_; }
+  LaneVectors rigid(AlignedArray& array) const { return {array.data() + model_.modes() * kLanes, kLanes, rigid_}; }
 
   bool runs(std::size_t l) const noexcept { return l < bodies_.size() && !alone_[l] && !done_[l]; }
 
@@ -117,8 +131,26 @@ class LaneStep {
       first_awake_ = std::min(l, first_awake_);
       steps_[l].emplace(model_, *body.scene, *body.state, *own_[l]);
       steps_[l]->begin(/*touches_others=*/false);
-      alone_[l] = steps_[l]->is_near();
     }
+  }
+
+  /// The unknowns of bodies near obstacles. Those of frames are zero in other lanes, with a Hessian of one.
+  void start_contacts() noexcept {
+    each([&](std::size_t l, Eigen::Index lane) {
+      if (!steps_[l]->is_near()) return;
+      const LaneBody& body = bodies_[l];
+      Workspace& own = *own_[l];
+      own.q = q_.row(lane).matrix();
+      start_contact(model_, *body.scene, *body.state, own);
+      contacts_[l].emplace(model_, *body.state, steps_[l]->potential(), own);
+      frames().begin_contact(lane);
+      rigid_ = model_.frame->rigid_unknowns();
+    });
+    for (AlignedArray* const array : {&workspace_.q_, &workspace_.gradient_, &workspace_.trial_gradient_})
+      rigid(*array).setZero();
+    each([&](std::size_t l, Eigen::Index lane) {
+      if (meets(l)) rigid(workspace_.q_).row(lane) = own_[l]->near->x.head(rigid_).transpose().array();
+    });
   }
 
   /// Lanes without a body, or with one that sleeps, repeat the first that is awake.
@@ -253,10 +285,12 @@ class LaneStep {
     return Eigen::Map<LaneNumbers>(matrices.data() + lane_entry(i, j));
   }
 
-  /// Value, its magnitude, force scale and gradient at x of the energies and forces there. The forces of frames are
-  /// those at x in the gradient, those frozen in the value.
-  void assemble(const LaneVectors& x, LaneVectors& gradient) noexcept {
+  /// Value, its magnitude, force scale and gradient at x of the energies and forces there, of the chosen. The forces of
+  /// frames are those at x in the gradient, those frozen in the value.
+  void assemble(AlignedArray& at, const LaneNumbers& chosen, AlignedArray& gradient_at) noexcept {
     fetch_next();
+    const LaneVectors x = vectors(at);
+    LaneVectors gradient = vectors(gradient_at);
     Eigen::Array<double, kLanes, kLaneSums> sums;
     kernels().lanes_assemble(forms_.arrays(), x.data(), workspace_.quadratic_.data(), linear_.data(), internal_.data(),
                              offset_.data(), gradient.data(), sums.data());
@@ -266,14 +300,75 @@ class LaneStep {
     there_.scale = external_norm_ + sums.col(2).sqrt() + forms_.acceleration_factor * sums.col(3).sqrt() +
                    rounding_ * sums.col(4).sqrt() / tolerance_;
     there_.residual = sums.col(5).sqrt();
-    if (!frames().exert_forces()) return;
-    there_.value += dot(frozen_, offset_);
-    const LaneNumbers found = frames().update(own(), running(), x, next_frozen_);
-    each([&](std::size_t, Eigen::Index lane) {
-      if (found[lane] == 0) there_.value[lane] = kInfinity;
+    each_meeting(chosen, [&](std::size_t l, Eigen::Index lane) { place(l, lane, at); });
+    if (frames().exert_forces()) {
+      there_.value += dot(frozen_, offset_);
+      const LaneNumbers found = frames().update(own(), chosen, meeting(), x, next_frozen_);
+      each([&](std::size_t, Eigen::Index lane) {
+        if (chosen[lane] != 0 && found[lane] == 0) there_.value[lane] = kInfinity;
+      });
+      gradient += next_frozen_;
+      there_.residual = norm(gradient);
+    }
+    each_meeting(chosen, [&](std::size_t l, Eigen::Index lane) { touch(l, lane, gradient_at); });
+  }
+
+  /// The chosen of those near obstacles.
+  template <class Work>
+  void each_meeting(const LaneNumbers& chosen, Work work) noexcept {
+    each([&](std::size_t l, Eigen::Index lane) {
+      if (meets(l) && chosen[lane] != 0) work(l, lane);
     });
-    gradient += next_frozen_;
-    there_.residual = norm(gradient);
+  }
+
+  BodyPose pose(std::size_t l) const noexcept { return {placements_[l], own_[l]->near->q}; }
+
+  /// Puts a body near obstacles, and its frame, where a lane's unknowns have it.
+  void place(std::size_t l, Eigen::Index lane, const AlignedArray& at) noexcept {
+    Workspace& own = *own_[l];
+    Eigen::VectorXd& x = own.near->x;
+    for (Eigen::Index k = 0; k < rigid_; ++k) x[k] = at[(model_.modes() + k) * kLanes + lane];
+    for (Eigen::Index c = 0; c < model_.modes(); ++c) x[rigid_ + c] = at[c * kLanes + lane] - start_(lane, c);
+    placements_[l] = contacts_[l]->place(x);
+  }
+
+  /// Adds what obstacles and the motion of the frame do there.
+  void touch(std::size_t l, Eigen::Index lane, AlignedArray& gradient_at) noexcept {
+    ContactProblemWorkspace& own = *own_[l]->near;
+    LaneVectors gradient = vectors(gradient_at);
+    own.gradient_q = gradient.row(lane).matrix();
+    contacts_[l]->evaluate_outside(pose(l));
+    Eigen::VectorXd& whole = own.newton.trial_gradient;
+    const PotentialEvaluation found =
+        contacts_[l]->finish(own.x, {{there_.value[lane], there_.magnitude[lane]}, there_.scale[lane]}, whole);
+    there_.value[lane] = found.potential.value;
+    there_.magnitude[lane] = found.potential.magnitude;
+    there_.scale[lane] = found.force_scale;
+    there_.residual[lane] = whole.norm();
+    gradient.row(lane) = whole.tail(model_.modes()).transpose().array();
+    rigid(gradient_at).row(lane) = whole.head(rigid_).transpose().array();
+  }
+
+  /// Adds the same to a lane's Hessian at the iterate, where its last evaluation was.
+  void stiffen(std::size_t l, Eigen::Index lane, AlignedArray& hessians) noexcept {
+    ContactProblemWorkspace& own = *own_[l]->near;
+    Eigen::Matrix3d turn;
+    if (rigid_ > 0) turn = model_.frame->turn_to_world(own.x, placements_[l]);
+    model_.contact->sum_squares(static_cast<int>(rigid_), rigid_ > 0 ? &turn : nullptr, pose(l), own.contact);
+    const double* const squares = own.contact.squares.data();
+    const Eigen::Index width = padded(unknowns());
+    for (Eigen::Index i = 0; i < unknowns(); ++i) {
+      double* const row = hessians.data() + lane_entry(i, 0) + lane;
+      for (Eigen::Index j = 0; j <= i; ++j) row[lane_entry(0, j)] += squares[j * width + i];
+    }
+  }
+
+  /// 1 for those near obstacles.
+  LaneNumbers meeting() const noexcept {
+    LaneNumbers numbers;
+    for (std::size_t l = 0; l < static_cast<std::size_t>(kLanes); ++l)
+      numbers[static_cast<Eigen::Index>(l)] = meets(l) ? 1 : 0;
+    return numbers;
   }
 
   /// 1 for those that still run.
@@ -286,16 +381,20 @@ class LaneStep {
 
   /// Takes the frozen forces of what was last assembled, of the chosen.
   void accept(const LaneNumbers& chosen) noexcept {
-    if (!frames().exert_forces()) return;
-    const LaneNumbers change = dot(next_frozen_, offset_) - dot(frozen_, offset_);
-    there_.value = (chosen != 0).select(there_.value + change, there_.value);
-    kernels().lanes_take(model_.modes(), chosen.data(), next_frozen_.data(), frozen_.data());
+    if (frames().exert_forces()) {
+      const LaneNumbers change = dot(next_frozen_, offset_) - dot(frozen_, offset_);
+      there_.value = (chosen != 0).select(there_.value + change, there_.value);
+      kernels().lanes_take(model_.modes(), chosen.data(), next_frozen_.data(), frozen_.data());
+    }
+    each([&](std::size_t l, Eigen::Index lane) {
+      if (meets(l) && chosen[lane] != 0) there_.value[lane] += model_.frame->accept_rigid(own_[l]->frame);
+    });
   }
 
   /// Factors of the Hessians of those that have none, from `stiffness_`.
   void factorise() noexcept {
-    const Eigen::Index modes = model_.modes();
-    const StageTimer timer(profile(), Stage::kSolve, flops(static_cast<double>(modes * modes * modes) / 3));
+    const Eigen::Index modes = model_.modes(), size = unknowns();
+    const StageTimer timer(profile(), Stage::kSolve, flops(static_cast<double>(size * size * size) / 3));
     // No factor is to be kept where all need one.
     const bool keeps = any(Hessian::kFactorised);
     fetch_next();
@@ -306,32 +405,38 @@ class LaneStep {
     each([&](std::size_t l, Eigen::Index lane) {
       if (state_[l] == Hessian::kFactorised) fresh[lane] = 0;
     });
-    if (frames().exert_forces()) frames().add_stiffness(own(), fresh, factor);
-    kernels().lanes_cholesky(factor.data(), modes);
+    if (frames().exert_forces()) frames().add_stiffness(own(), fresh, meeting(), factor);
+    if (rigid_ > 0) frames().set_rigid_rows(own(), meeting(), factor);
+    each([&](std::size_t l, Eigen::Index lane) {
+      if (meets(l) && fresh[lane] != 0) stiffen(l, lane, factor);
+    });
+    kernels().lanes_cholesky(factor.data(), size);
     each([&](std::size_t l, Eigen::Index lane) {
       if (fresh[lane] == 0) return;
       ++reports_[l].factorisations;
-      alone_[l] = !std::isfinite(entry(factor, modes - 1, modes - 1)[lane]);
+      alone_[l] = !std::isfinite(entry(factor, size - 1, size - 1)[lane]);
     });
     if (keeps)
-      kernels().lanes_take(lane_triangle(modes) / kLanes, fresh.data(), factor.data(), workspace_.factor_.data());
+      kernels().lanes_take(lane_triangle(size) / kLanes, fresh.data(), factor.data(), workspace_.factor_.data());
   }
 
   void find_direction() noexcept {
-    const Eigen::Index modes = model_.modes();
-    const StageTimer timer(profile(), Stage::kSolve, flops(2.0 * static_cast<double>(modes * modes)));
+    const Eigen::Index size = unknowns();
+    const StageTimer timer(profile(), Stage::kSolve, flops(2.0 * static_cast<double>(size * size)));
     direction_ = -gradient_;
+    rigid(workspace_.direction_) = -rigid(workspace_.gradient_);
     fetch_next();
-    kernels().lanes_cholesky_solve(workspace_.factor_.data(), modes, direction_.data());
+    kernels().lanes_cholesky_solve(workspace_.factor_.data(), size, direction_.data());
     if (frames().exert_forces()) add_gyroscopic_terms();
-    slope_ = dot(gradient_, direction_);
+    slope_ = runtime::dot(size, gradient_.data(), direction_.data());
   }
 
-  /// As solve_direction() of newton.h; a part that is not weak is left to step().
+  /// As solve_direction() of newton.h; a part that is not weak is left to step(). Near obstacles there is none.
   void add_gyroscopic_terms() noexcept {
     const LaneNumbers ratios = frames().gyroscopic_ratios(own());
     LaneNumbers terms = LaneNumbers::Zero();
     each([&](std::size_t l, Eigen::Index lane) {
+      if (meets(l)) return;
       if (IncrementalPotential::is_weak(ratios[lane]))
         terms[lane] = IncrementalPotential::gyroscopic_terms(ratios[lane]);
       else
@@ -343,7 +448,7 @@ class LaneStep {
       trial_ = direction_;
       frames().gyroscopic_products(own(), chosen, trial_, offset_);
       trial_gradient_ = -gradient_ - offset_;
-      kernels().lanes_cholesky_solve(workspace_.factor_.data(), model_.modes(), trial_gradient_.data());
+      kernels().lanes_cholesky_solve(workspace_.factor_.data(), unknowns(), trial_gradient_.data());
       kernels().lanes_take(model_.modes(), chosen.data(), trial_gradient_.data(), direction_.data());
     }
   }
@@ -358,11 +463,59 @@ class LaneStep {
            there_.residual[lane] <= 0.5 * reports_[l].residual;
   }
 
+  /// After a minimisation near obstacles, as minimise_with_friction(): true where no other one follows.
+  bool ends_rounds(std::size_t l) noexcept {
+    NewtonReport& total = totals_[l];
+    add(reports_[l], total);
+    const bool is_settled = model_.contact->refresh_friction(own_[l]->near->contact) <= kSameFriction;
+    if (is_settled || ++rounds_[l] == kFrictionRounds) {
+      reports_[l] = total;
+      return true;
+    }
+    if (total.factorisations > 0)
+      state_[l] = total.status == NewtonStatus::kConverged ? Hessian::kFactorised : Hessian::kStale;
+    return false;
+  }
+
+  /// Begins other rounds where the last ones of the chosen ended.
+  void begin_rounds(const LaneNumbers& chosen) noexcept {
+    there_.energy = energy_;
+    assemble(workspace_.q_, chosen, workspace_.trial_gradient_);
+    const LaneNumbers residual = there_.residual;
+    accept(chosen);
+    each_meeting(chosen, [&](std::size_t l, Eigen::Index lane) {
+      take_evaluation(lane);
+      reports_[l] = {};
+      reports_[l].residual = residual[lane];
+      unchecked_from_[l] = kInfinity;
+    });
+    kernels().lanes_take(unknowns(), chosen.data(), trial_gradient_.data(), gradient_.data());
+  }
+
+  void take_evaluation(Eigen::Index lane) noexcept {
+    here_.value[lane] = there_.value[lane];
+    here_.magnitude[lane] = there_.magnitude[lane];
+    here_.scale[lane] = there_.scale[lane];
+  }
+
   void end_where_there_is_reason() noexcept {
-    LaneNumbers returned = LaneNumbers::Zero();
+    for (;;) {
+      const LaneNumbers again = end_rounds();
+      if ((again == 0).all()) return;
+      begin_rounds(again);
+    }
+  }
+
+  /// 1 for those that begin another round.
+  LaneNumbers end_rounds() noexcept {
+    LaneNumbers returned = LaneNumbers::Zero(), again = returned;
     each([&](std::size_t l, Eigen::Index lane) {
       NewtonReport& report = reports_[l];
       if (std::isfinite(unchecked_from_[l]) && !(report.residual <= unchecked_from_[l])) {
+        if (meets(l)) {  // its contacts would have to go back, too
+          alone_[l] = true;
+          return;
+        }
         q_.row(lane) = previous_.row(lane);
         energy_[lane] = previous_energy_[lane];
         report.residual = unchecked_from_[l];
@@ -378,12 +531,14 @@ class LaneStep {
       if (!reason) return;
       if (*reason == NewtonStatus::kNonFinite) {
         alone_[l] = true;
-      } else {
-        report.status = *reason;
-        done_[l] = true;
+        return;
       }
+      report.status = *reason;
+      done_[l] = !meets(l) || ends_rounds(l);
+      if (!done_[l]) again[lane] = 1;
     });
-    if (frames().exert_forces() && (returned != 0).any()) frames().update(own(), returned, q_, next_frozen_);
+    if (frames().exert_forces() && (returned != 0).any()) frames().update(own(), returned, meeting(), q_, next_frozen_);
+    return again;
   }
 
   template <class Condition>
@@ -399,7 +554,7 @@ class LaneStep {
 
   void minimise() noexcept {
     there_.energy = energy_;
-    assemble(q_, gradient_);
+    assemble(workspace_.q_, running(), workspace_.gradient_);
     const LaneNumbers residual = there_.residual;
     accept(running());
     each([&](std::size_t l, Eigen::Index lane) {
@@ -429,16 +584,16 @@ class LaneStep {
       below_rounding_[l] = std::abs(slope_[lane]) <= kRounding * here_.magnitude[lane];
       unchecked_from_[l] = below_rounding_[l] ? reports_[l].residual : kInfinity;
     });
-    kernels().lanes_sum(model_.modes(), q_.data(), direction_.data(), trial_.data());
-    for (std::size_t l = 0; l < static_cast<std::size_t>(kLanes); ++l)
-      if (!runs(l)) trial_.row(static_cast<Eigen::Index>(l)) = q_.row(static_cast<Eigen::Index>(l));
+    kernels().lanes_sum(unknowns(), q_.data(), direction_.data(), trial_.data());
+    const LaneNumbers ended = 1 - running();
+    kernels().lanes_take(unknowns(), ended.data(), q_.data(), trial_.data());
     {
       const StageTimer timer(profile(), Stage::kInternalForce, flops(force_flops()));
       fetch_next();
       elements_.lanes_force(trial_.data(), workspace_.elastic_scratch_.data(), there_.energy.data(), internal_.data());
-      assemble(trial_, trial_gradient_);
+      assemble(workspace_.trial_, running(), workspace_.trial_gradient_);
     }
-    slope_there_ = dot(trial_gradient_, direction_);
+    slope_there_ = runtime::dot(unknowns(), trial_gradient_.data(), direction_.data());
     LaneNumbers taken = LaneNumbers::Zero();
     each([&](std::size_t l, Eigen::Index lane) {
       if (!is_low_enough(l, lane)) {
@@ -452,9 +607,7 @@ class LaneStep {
       NewtonReport& report = reports_[l];
       previous_energy_[lane] = energy_[lane];
       energy_[lane] = there_.energy[lane];
-      here_.value[lane] = there_.value[lane];
-      here_.magnitude[lane] = there_.magnitude[lane];
-      here_.scale[lane] = there_.scale[lane];
+      take_evaluation(lane);
       ++report.iterations;
       const double before = report.residual;
       report.residual = there_.residual[lane];
@@ -464,7 +617,7 @@ class LaneStep {
                       : Hessian::kStale;
     });
     for (const auto& [from, to] : {std::pair(&q_, &previous_), {&trial_, &q_}, {&trial_gradient_, &gradient_}})
-      kernels().lanes_take(model_.modes(), taken.data(), from->data(), to->data());
+      kernels().lanes_take(unknowns(), taken.data(), from->data(), to->data());
   }
 
   struct Evaluation {
@@ -480,6 +633,11 @@ class LaneStep {
       next_frozen_, offset_, external_, velocity_centre_, acceleration_centre_;
   std::array<Workspace*, kLanes> own_{};
   std::array<std::optional<BodyStep>, kLanes> steps_;
+  std::array<std::optional<ContactProblem>, kLanes> contacts_;
+  std::array<Placement, kLanes> placements_;
+  Eigen::Index rigid_ = 0;
+  std::array<int, kLanes> rounds_{};
+  std::array<NewtonReport, kLanes> totals_;
   std::array<bool, kLanes> alone_{}, done_{}, below_rounding_{};
   std::size_t first_awake_ = kLanes, fetched_ = 0;
   std::array<int, kLanes> start_searches_{};

@@ -17,9 +17,9 @@ struct LaneBody {
 
 /// One step of each of 1 to kLanes bodies of one model, as step() takes it, but side by side: each in its lane of the
 /// registers, so that the model's constants are read once for all. docs/step_in_detail.md, "Bodies in lanes". A body
-/// that sleeps, one near an obstacle, and one that Newton's method needs more for than whole steps with exact Hessians,
-/// step by themselves. No body's numbers depend on the others'; they are those of step() to rounding. No call allocates
-/// or throws. `next`: those whose turn comes after these, if that is known.
+/// that sleeps, and one that Newton's method needs more for than whole steps with exact Hessians, step by themselves.
+/// No body's numbers depend on the others'; they are those of step() to rounding. No call allocates or throws. `next`:
+/// those whose turn comes after these, if that is known.
 void step_in_lanes(const Model& model, std::span<const LaneBody> bodies, LaneWorkspace& workspace,
                    std::span<StepReport> reports, std::span<const LaneBody> next = {}) noexcept;
 

@@ -16,11 +16,13 @@ LaneWorkspace::LaneWorkspace(const Model& model, const StepScene& scene, std::si
   model.internal_force.cubature().prepare_lanes();
   const Eigen::Index modes = model.modes();
   forms_ = LaneForms(modes);
-  for (AlignedArray* vectors : {&q_, &previous_, &trial_, &gradient_, &trial_gradient_, &internal_, &direction_,
-                                &linear_, &frozen_, &next_frozen_, &offset_, &elastic_scratch_})
+  const Eigen::Index unknowns = modes + (touches(model, scene) ? model.frame->rigid_unknowns() : 0);
+  for (AlignedArray* vectors : {&q_, &previous_, &trial_, &gradient_, &trial_gradient_, &direction_})
+    *vectors = AlignedArray(unknowns * kLanes);
+  for (AlignedArray* vectors : {&internal_, &linear_, &frozen_, &next_frozen_, &offset_, &elastic_scratch_})
     *vectors = AlignedArray(modes * kLanes);
-  for (AlignedArray* matrices : {&quadratic_, &stiffness_, &factor_, &new_factor_})
-    *matrices = AlignedArray(lane_triangle(modes));
+  for (AlignedArray* matrices : {&quadratic_, &stiffness_}) *matrices = AlignedArray(lane_triangle(modes));
+  for (AlignedArray* matrices : {&factor_, &new_factor_}) *matrices = AlignedArray(lane_triangle(unknowns));
   for (const ExampleModel& examples : model.examples) examples_.emplace_back(examples);
 }
 

@@ -43,12 +43,16 @@ PotentialEvaluation ContactProblem::evaluate_alone(const Eigen::VectorXd& x, boo
   const BodyPose pose = place(x);
   const PotentialEvaluation alone = first ? potential_.evaluate(near_.q, near_.gradient_q, workspace_.newton.hessian)
                                           : potential_.evaluate(near_.q, near_.gradient_q);
+  evaluate_outside(pose);
+  return alone;
+}
+
+void ContactProblem::evaluate_outside(const BodyPose& pose) noexcept {
   if (model_.contact) {
     model_.contact->evaluate(pose, near_.contact);
     near_.extent = pose.position.norm() + model_.contact->reach();
   }
   evaluate_springs(state_.attachments, potential_.rate(), pose, near_.held);
-  return alone;
 }
 
 PotentialEvaluation ContactProblem::finish(const Eigen::VectorXd& x, const PotentialEvaluation& alone,
@@ -71,13 +75,16 @@ PotentialEvaluation ContactProblem::finish(const Eigen::VectorXd& x, const Poten
 
 PotentialValue ContactProblem::value(const Eigen::VectorXd& x) noexcept {
   const BodyPose pose = place(x);
-  PotentialValue value = potential_.value(near_.q);
+  return finish(x, pose, potential_.value(near_.q));
+}
+
+PotentialValue ContactProblem::finish(const Eigen::VectorXd& x, const BodyPose& pose, PotentialValue alone) noexcept {
   const double touching = model_.contact ? model_.contact->potential(pose, near_.contact) : 0;
   const double added = touching + spring_potential(state_.attachments, potential_.rate(), pose) +
                        frame_.rigid_potential(x, workspace_.frame);
-  value.value += added;
-  value.magnitude += std::abs(added);
-  return value;
+  alone.value += added;
+  alone.magnitude += std::abs(added);
+  return alone;
 }
 
 void ContactProblem::hessian(const Eigen::VectorXd& x, Tangent tangent, Eigen::MatrixXd& hessian) noexcept {

@@ -40,8 +40,13 @@ class ContactProblem {
   /// Evaluates the body, its obstacles and springs at x; sums of the contacts in workspace.near->contact, of the
   /// springs in workspace.near->held. `first`: with the elastic Hessian of the potential's start().
   PotentialEvaluation evaluate_alone(const Eigen::VectorXd& x, bool first) noexcept;
+  /// Obstacles and springs alone at a pose: the sums.
+  void evaluate_outside(const BodyPose& pose) noexcept;
+  /// `alone` and its gradient in workspace.near->gradient_q, with what outside and a rigid motion add.
   PotentialEvaluation finish(const Eigen::VectorXd& x, const PotentialEvaluation& alone,
                              Eigen::VectorXd& gradient) noexcept;
+  /// value() of a body whose own is `alone`, at the pose of x.
+  PotentialValue finish(const Eigen::VectorXd& x, const BodyPose& pose, PotentialValue alone) noexcept;
   /// The elastic Hessian at a pose, into workspace.newton.
   void evaluate_elastic_hessian(const BodyPose& pose, Tangent tangent) noexcept;
   /// The stiffness of obstacles and springs, alone in workspace.near->stiffness.

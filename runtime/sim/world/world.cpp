@@ -331,7 +331,8 @@ void World::step_crowd(int threads, StepObserver* observer) {
   for (int i = 0; i < count(); ++i) {
     Member& own = at(i);
     if (!is_in_island(i) && !own.asleep) {
-      Workspace* const scratch = own.touching ? &own.touching->workspace : own.held.get();
+      // Scratch that all share stays in the cache.
+      Workspace* const scratch = !goes_alone(own) ? nullptr : own.touching ? &own.touching->workspace : own.held.get();
       const FullModel* const full = own.state->full ? own.kind.full : nullptr;
       crowd_.take(
           {i, own.crowd_kind, own.kind.scene, own.state, scratch, &own.report, full, own.full.get(), goes_alone(own)});

@@ -236,38 +236,155 @@ TEST(LaneStep, ABodyThatNeedsMoreStepsByItself) {
     EXPECT_LE(difference(*model, each.states[i], lanes.states[i]), 1e-7) << i;
 }
 
-// Near an obstacle each has the bits of its own step.
-TEST(LaneStep, BodiesNearObstaclesStepByThemselves) {
-  Bar bar = test::make_bar({.free = true});
-  bar.model.contact = test::surface_contact(bar.model);
-  const auto model = prepared(bar);
-  const Kind kind{};
-  Crowd lanes = make_crowd(bar, *model, kind, 8);
-  for (StepScene& scene : lanes.scenes) {
-    Obstacle floor;
-    floor.shape = Plane{Eigen::Vector3d(0, 0, 0), Eigen::Vector3d::UnitZ()};
-    floor.stiffness = 1e6;
-    scene.obstacles = {floor};
+Obstacle solid(const Shape& shape, double friction = 0) {
+  Obstacle obstacle;
+  obstacle.shape = shape;
+  obstacle.stiffness = 2e6;
+  obstacle.damping = 1e4;
+  obstacle.friction = friction;
+  return obstacle;
+}
+
+enum class Frame { kFree, kClamped, kCarried };
+
+/// What a body of a crowd may meet.
+struct Ground {
+  std::string name;
+  Obstacles obstacles;
+  Frame frame = Frame::kFree;
+};
+
+std::vector<Ground> grounds() {
+  const Plane floor{Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitZ()};
+  const Plane below{Eigen::Vector3d(0, 0, -0.01), Eigen::Vector3d::UnitZ()};
+  const Plane slope{Eigen::Vector3d::Zero(), Eigen::Vector3d(0.2, 0.1, 1).normalized()};
+  const Box box{Eigen::Vector3d(0.1, 0, -1), Eigen::Vector3d(0.6, 0.5, 1)};
+  const Sphere sphere{Eigen::Vector3d(0.05, 0, -2), 2};
+  Obstacle lift = solid(floor, 0.5);
+  lift.motion = RigidMotion::going_on(0, {.linear_velocity = Eigen::Vector3d(0.1, 0, 0.2)});
+  return {{"floor", {solid(floor)}},
+          {"clamped_floor", {solid(below, 0.3)}, Frame::kClamped},
+          {"carried_floor", {solid(below, 0.3)}, Frame::kCarried},
+          {"slope", {solid(slope, 0.6)}},
+          {"slippery_slope", {solid(slope, 0.1)}},
+          {"box", {solid(box, 0.4)}},
+          {"sphere", {solid(sphere, 0.4)}},
+          {"corner", {solid(floor, 0.4), solid(slope, 0.2), solid(sphere)}},
+          {"lift", {lift}}};
+}
+
+/// Bodies above it, each at a height of its own: some touch in the first step, others fall for a while, the last never
+/// come near.
+Crowd crowd_above(const Ground& ground, const Bar& bar, const Model& model, std::size_t count) {
+  Crowd crowd = make_crowd(bar, model, {.integrator = Integrator::kBdf2}, count);
+  for (std::size_t i = 0; i < count; ++i) {
+    StepScene& scene = crowd.scenes[i];
+    scene.obstacles = ground.obstacles;
+    scene.mass_damping = 2;
     scene.gravity = Eigen::Vector3d(0, 0, -9.81);
-    scene.gravity_force = gravity_force(*model, scene.gravity);
+    scene.gravity_force = gravity_force(model, scene.gravity);
+    State& state = crowd.states[i];
+    const auto height = 0.02 * static_cast<double>(i) + (i % 4 == 3 ? 50 : 0);
+    set_motion(model,
+               {.position = -model.frame->centre_of_mass() + Eigen::Vector3d(0, 0, 0.18 + height),
+                .linear_velocity = Eigen::Vector3d(0.1, 0, -0.5),
+                .angular_velocity = Eigen::Vector3d(0.3, 1, 0.2)},
+               state);
+    prepare_contacts(model, ground.obstacles.size(), state);
+    if (ground.frame != Frame::kCarried) continue;
+    const Eigen::Quaterniond tilted(Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY()));
+    scene.carrier = RigidMotion(std::vector<Keyframe>{{}, {0.4, Eigen::Vector3d(0, 0, -0.05), tilted}});
+    Workspace workspace(model, scene);
+    follow_frame(model, scene, state, workspace);
   }
-  for (State& state : lanes.states) {
-    FrameMotion motion = model->frame->motion(state.frame);
-    motion.position[2] = 0.05;
-    set_motion(*model, motion, state);
-    prepare_contacts(*model, 1, state);
+  return crowd;
+}
+
+Bar touching_bar(Frame frame) {
+  Bar bar = test::make_bar({.free = frame == Frame::kFree, .carried = frame == Frame::kCarried});
+  bar.model.contact = test::surface_contact(bar.model);
+  return bar;
+}
+
+// Falls, impacts and the rest after them: 400 steps of bodies that are near obstacles and of others beside them.
+TEST(LaneStep, MovesBodiesNearObstaclesAsOneByOne) {
+  for (const Ground& ground : grounds()) {
+    const Bar bar = touching_bar(ground.frame);
+    const auto model = prepared(bar, {.carried = ground.frame == Frame::kCarried});
+    Crowd lanes = crowd_above(ground, bar, *model, 8), each = lanes;
+    LaneWorkspace workspace(*model, lanes.scenes.front());
+    std::vector<StepReport> reports(8), expected(8);
+    int contacts = 0, in_lanes = 0, iterations = 0, more = 0;
+    for (int n = 0; n < 400; ++n) {
+      step_in_lanes(*model, lanes.bodies(), workspace, reports);
+      step_each(*model, each, expected);
+      for (std::size_t i = 0; i < 8; ++i) {
+        EXPECT_EQ(reports[i].contacts, expected[i].contacts) << ground.name << ", body " << i << ", step " << n;
+        EXPECT_LE((reports[i].contact_force - expected[i].contact_force).norm(),
+                  1e-5 * (1 + expected[i].contact_force.norm()));
+        if (expected[i].contacts == 0) continue;
+        ++contacts;
+        in_lanes += difference(*model, each.states[i], lanes.states[i]) > 0 ? 1 : 0;
+        iterations += expected[i].newton_iterations;
+        more += reports[i].newton_iterations - expected[i].newton_iterations;
+      }
+    }
+    for (std::size_t i = 0; i < 8; ++i)
+      EXPECT_LE(difference(*model, each.states[i], lanes.states[i]), 1e-8) << ground.name << ", body " << i;
+    EXPECT_GT(contacts, 200) << ground.name;
+    EXPECT_GT(in_lanes, contacts / 2) << ground.name << ": they step by themselves";
+    EXPECT_LE(std::abs(more), iterations / 50) << ground.name;
   }
-  Crowd each = lanes;
-  LaneWorkspace workspace(*model, lanes.scenes.front());
+}
+
+// Stiffness in single precision, which the residual is not.
+TEST(LaneStep, MixedPrecisionMovesBodiesNearObstaclesAsDouble) {
+  const Bar bar = touching_bar(Frame::kFree);
+  const auto model = prepared(bar);
+  Crowd mixed = crowd_above(grounds().front(), bar, *model, 8);
+  for (StepScene& scene : mixed.scenes) scene.stiffness_damping = 0;
+  Crowd exact = mixed;
+  for (StepScene& scene : mixed.scenes) scene.precision = Precision::kMixed;
+  LaneWorkspace workspace(*model, mixed.scenes.front());
   std::vector<StepReport> reports(8), expected(8);
   int contacts = 0;
-  for (int n = 0; n < 40; ++n) {
-    step_in_lanes(*model, lanes.bodies(), workspace, reports);
-    step_each(*model, each, expected);
-    for (std::size_t i = 0; i < 8; ++i) contacts += expected[i].contacts;
+  for (int n = 0; n < 200; ++n) {
+    step_in_lanes(*model, mixed.bodies(), workspace, reports);
+    step_in_lanes(*model, exact.bodies(), workspace, expected);
+    for (std::size_t i = 0; i < 8; ++i) {
+      EXPECT_EQ(reports[i].contacts, expected[i].contacts) << "body " << i << ", step " << n;
+      contacts += expected[i].contacts;
+    }
   }
   EXPECT_GT(contacts, 0);
-  for (std::size_t i = 0; i < 8; ++i) EXPECT_LE(difference(*model, each.states[i], lanes.states[i]), 1e-9) << i;
+  for (std::size_t i = 0; i < 8; ++i)
+    EXPECT_LE(difference(*model, exact.states[i], mixed.states[i]), 1e-8) << "body " << i;
+  EXPECT_GT(difference(*model, exact.states[0], mixed.states[0]), 0) << "it is the same";
+}
+
+// Those near an obstacle and those that are not have each the same numbers beside any others.
+TEST(LaneStep, NoBodyNearObstaclesDependsOnTheOthers) {
+  const Ground ground = grounds()[2];
+  const Bar bar = touching_bar(Frame::kFree);
+  const auto model = prepared(bar);
+  const Crowd crowd = crowd_above(ground, bar, *model, 8);
+  Crowd all = crowd, few;
+  const std::array<std::size_t, 4> chosen{6, 3, 0, 1};
+  for (const std::size_t i : chosen) {
+    few.scenes.push_back(crowd.scenes[i]);
+    few.states.push_back(crowd.states[i]);
+  }
+  LaneWorkspace workspace(*model, crowd.scenes.front());
+  std::vector<StepReport> reports(8);
+  int contacts = 0;
+  for (int n = 0; n < 200; ++n) {
+    step_in_lanes(*model, all.bodies(), workspace, reports);
+    for (const StepReport& report : reports) contacts += report.contacts;
+    step_in_lanes(*model, few.bodies(), workspace, std::span(reports).first(4));
+  }
+  EXPECT_GT(contacts, 0);
+  for (std::size_t k = 0; k < chosen.size(); ++k)
+    EXPECT_EQ(difference(*model, all.states[chosen[k]], few.states[k]), 0) << k;
 }
 
 TEST(LaneStep, IsForWhatItKnows) {
@@ -280,6 +397,19 @@ TEST(LaneStep, IsForWhatItKnows) {
   EXPECT_TRUE(can_step_side_by_side(*cubature, scene));
   scene.examples = {{.stiffness = 2, .elastic = true}};
   EXPECT_FALSE(can_step_side_by_side(*cubature, scene));
+}
+
+TEST(LaneStep, AllocatesNothingNearObstacles) {
+  const Bar bar = touching_bar(Frame::kFree);
+  const auto model = prepared(bar);
+  Crowd crowd = crowd_above(grounds()[2], bar, *model, 8);
+  const auto bodies = crowd.bodies();
+  LaneWorkspace workspace(*model, crowd.scenes.front());
+  std::vector<StepReport> reports(8);
+  const test::AllocationCounter allocations;
+  for (int n = 0; n < 100; ++n) step_in_lanes(*model, bodies, workspace, reports);
+  EXPECT_EQ(allocations.count(), 0);
+  EXPECT_GT(reports.front().contacts, 0);
 }
 
 TEST(LaneStep, AllocatesNothing) {
