@@ -36,9 +36,8 @@ space. The time of a step depends on r and s: [performance](../performance.md#wh
 | scene | m | r | s | internal force | error |
 | --- | ---: | ---: | ---: | --- | ---: |
 {rows}
-The cross and the teddy of local examples with 20 modes are above 3 %. The teddy's internal force is exact there (a
-polynomial), so 20 modes are too few for an arm that moves alone. The car, which is thrown, is about 2 % off with all of
-them.
+The teddy of local examples with 20 modes is above 3 %: its internal force is exact there (a polynomial), so 20 modes
+are too few for an arm that moves alone. The cross and the car, which are free, are 2 to 3 % off with all of them.
 
 ## What each approximation adds
 
