@@ -20,7 +20,7 @@ bool is_text(char c) { return (c >= 0x20 && c < 0x7f) || c == '\t' || c == '\r' 
 struct Beginning {
   std::string_view bytes, kind, extension;
 };
-constexpr std::array<Beginning, 14> kBeginnings{{{"\x89HDF", "an HDF5 file (a bundle or a trajectory?)", ".h5"},
+constexpr std::array<Beginning, 16> kBeginnings{{{"\x89HDF", "an HDF5 file (a bundle or a trajectory?)", ".h5"},
                                                  {"exmatpk\n", "a pack of a bundle", ".h5"},
                                                  {"glTF", "a glTF file (.glb)", ".glb"},
                                                  {"Kaydara FBX", "an FBX file", ".fbx"},
@@ -28,6 +28,8 @@ constexpr std::array<Beginning, 14> kBeginnings{{{"\x89HDF", "an HDF5 file (a bu
                                                  {"BLENDER", "a Blender file", ".blend"},
                                                  {"PK\3\4", "a ZIP archive (.npz, .3mf or .usdz?)", ".npz"},
                                                  {"\x93NUMPY", "a NumPy array", ".npy"},
+                                                 {"\x89PNG\r\n", "a PNG image", ".png"},
+                                                 {"\x1f\x8b", "a file that gzip packed", ".gz"},
                                                  {"$MeshFormat", "a Gmsh mesh", ".msh"},
                                                  {"# vtk DataFile", "a VTK file", ".vtk"},
                                                  {"MeshVersionFormatted", "a MEDIT mesh", ".mesh"},
@@ -51,7 +53,7 @@ constexpr std::string_view kFromBlender = "export it as .glb, as Blender does",
                            kFromGmsh = "make tets of it, as 'gmsh -3 IN -o OUT.msh' does",
                            kFromPython =
                                "arrays go in from Python: exmat.precompute.write_mesh or exmat.precompute.bundle";
-constexpr std::array<std::pair<std::string_view, std::string_view>, 26> kWays{
+constexpr std::array<std::pair<std::string_view, std::string_view>, 28> kWays{
     {{".fbx", kFromBlender},
      {".blend", kFromBlender},
      {".dae", kFromBlender},
@@ -76,6 +78,8 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 26> kWays{
      {".brep", kFromGmsh},
      {".npz", kFromPython},
      {".npy", kFromPython},
+     {".gz", "unpack it, as 'gunzip' does"},
+     {".png", "an image is no mesh: name a mesh or a surface"},
      {".h5", "a bundle or a trajectory is no mesh: name the file that it was made of"},
      {".json", "an asset file is no mesh: name the file that it names"}}};
 

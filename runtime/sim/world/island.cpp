@@ -107,6 +107,11 @@ void IslandProblem::collect_hard() {
   conditions.resize(count);
 }
 
+void IslandProblem::loosen(Eigen::Index most) {
+  for (const HardAttachment& hard : workspace_.hard) hard.attachment->loosen(most);
+  collect_hard();
+}
+
 /// At x; returns how far the bodies are from the origin [m].
 double IslandProblem::set_conditions(const Eigen::VectorXd& x) noexcept {
   place(x);
@@ -588,6 +593,15 @@ NewtonReport solve_island(std::span<WorldBody* const> bodies, std::span<PairCont
     add(minimise(problem, bodies, pairs, threads, workspace), total);
     if (total.status == NewtonStatus::kConverged && is_above_start(problem, bodies, workspace))
       total.status = NewtonStatus::kAboveStart;
+  }
+  // Patches that are pressed flat have no rotation that conditions could hold.
+  for (const Eigen::Index conditions : {3, 0}) {
+    if (!problem.has_hard() || (total.status != NewtonStatus::kNonFinite && workspace.x.allFinite())) break;
+    problem.loosen(conditions);
+    stay(bodies, workspace.x);
+    for (WorldBody* const own : bodies) start_at(*own, workspace.x, own->state.q);
+    add(minimise(problem, bodies, pairs, threads, workspace), total);
+    if (total.status == NewtonStatus::kConverged) total.status = NewtonStatus::kStagnated;
   }
   for (WorldBody* const own : bodies)
     if (!own->full) own->near().x = workspace.x.segment(own->offset, own->unknowns());

@@ -81,6 +81,9 @@ class IslandProblem {
   /// nothing leads there.
   bool begin(Eigen::VectorXd& x, NewtonReport& report) noexcept;
 
+  /// As PairAttachment::loosen(), of all hard attachments.
+  void loosen(Eigen::Index most);
+
   PotentialEvaluation evaluate(Eigen::VectorXd& x, Eigen::VectorXd& gradient, Eigen::MatrixXd& hessian) noexcept;
   PotentialEvaluation evaluate(Eigen::VectorXd& x, Eigen::VectorXd& gradient) noexcept;
   PotentialValue value(Eigen::VectorXd& x) noexcept;

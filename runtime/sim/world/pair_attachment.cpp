@@ -1,12 +1,16 @@
 #include "runtime/sim/world/pair_attachment.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 
 #include "runtime/sim/frame/spin.h"
 #include "runtime/sim/step/contact_step.h"
 
 namespace exmat::runtime {
 namespace {
+
+constexpr double kMostReturn = 0.1;  // of the rotation between patches, in a step [rad]
+constexpr double kOpposite = 3;      // between rotations that no step brings together [rad]
 
 /// J^T of a point at `arm` and of the patch's rotation, from how the point goes by q [3 x r].
 void set_gradients(int rigid, const Eigen::Vector3d& arm, const Eigen::Matrix3Xd& way, const Eigen::Matrix3Xd& turn,
@@ -35,7 +39,7 @@ void PairAttachment::set_places(const BodyPose& own, const BodyPose& other) noex
   other_arm_ = other_.arm + other_.rotation * attachment_->other->offset;
   violation_.head<3>() = own.position + own_.arm - other.position - other_arm_;
   const Eigen::AngleAxisd turn(Eigen::Matrix3d(own_.rotation * other_.rotation.transpose()));
-  violation_.tail<3>() = turn.angle() * turn.axis();
+  violation_.tail<3>() = turn.angle() * turn.axis() - open_;
 }
 
 void PairAttachment::begin(Attachment& attachment, int side, const WorldBody& first, const WorldBody& second) noexcept {
@@ -45,8 +49,19 @@ void PairAttachment::begin(Attachment& attachment, int side, const WorldBody& fi
   force_.setZero();
   torque_.setZero();
   const WorldBody &own = side == 0 ? first : second, &other = side == 0 ? second : first;
+  open_.setZero();
   set_places(pose_of(own.model, own.state), pose_of(other.model, other.state));
   start_ = violation_.head<3>();
+  const double apart = violation_.tail<3>().norm();
+  if (apart > kMostReturn) open_ = (1 - kMostReturn / apart) * violation_.tail<3>();
+  const bool turns_alike = attachment.kind == AttachmentKind::kFixed && apart < kOpposite;
+  conditions_ = is_spring() ? 0 : turns_alike ? 6 : 3;
+}
+
+void PairAttachment::loosen(Eigen::Index most) noexcept {
+  conditions_ = std::min(conditions_, most);
+  force_.setZero();
+  torque_.setZero();
 }
 
 void PairAttachment::evaluate(const WorldBody& first, const WorldBody& second) noexcept {

@@ -11,22 +11,25 @@ namespace exmat::runtime {
 /// An attachment between two bodies of a pair, at their iterates. x is the mean of the patch of the body that has it, y
 /// the point that holds x in the other's patch, as that patch goes and turns. A spring pulls them together,
 ///   k/2 |x - y|^2 + c/(2 dt) |(x - y) - (x - y)_n|^2;
-/// the others are conditions x - y = 0 and, of a fixed one, that the two patches turn alike. What acts on one body at x
-/// acts on the other at y with the opposite sign. docs/step_in_detail.md, "Attachments".
+/// the others are conditions x - y = 0 and, of a fixed one, that the two patches turn alike. A patch that is pressed
+/// flat or inside out has turned by half a turn at once: rotations that are far apart where a step begins come together
+/// over several steps, and are let go while they are opposite. What acts on one body at x acts on the other at y with
+/// the opposite sign. docs/step_in_detail.md, "Attachments".
 class PairAttachment {
  public:
   /// The attachment is one of the body of this side; the bodies stand where a step begins.
   void begin(Attachment& attachment, int side, const WorldBody& first, const WorldBody& second) noexcept;
 
   bool is_spring() const noexcept { return attachment_->kind == AttachmentKind::kSpring; }
-  Eigen::Index conditions() const noexcept {
-    return is_spring() ? 0 : attachment_->kind == AttachmentKind::kBall ? 3 : 6;
-  }
+  /// Of its conditions the first: 3 on places, then 3 on rotations.
+  Eigen::Index conditions() const noexcept { return conditions_; }
+  /// Leaves out all but the first `most` in this step.
+  void loosen(Eigen::Index most) noexcept;
 
   // At the iterates of the bodies.
 
   void evaluate(const WorldBody& first, const WorldBody& second) noexcept;
-  /// x - y [m], then the rotation vector of the own patch against the other's.
+  /// x - y [m], then the rotation vector of the own patch against the other's, less what this step leaves open.
   const Eigen::Matrix<double, 6, 1>& violation() const noexcept { return violation_; }
   /// Their derivative by a side's unknowns, transposed [unknowns x 6], with rotations about world axes.
   const Eigen::MatrixXd& gradients(int side) const noexcept { return gradients_[static_cast<std::size_t>(side)]; }
@@ -58,8 +61,10 @@ class PairAttachment {
 
   Attachment* attachment_ = nullptr;
   int side_ = 0;
+  Eigen::Index conditions_ = 0;
   double rate_ = 0;                                  // 1 / dt [1/s]
   Eigen::Vector3d start_ = Eigen::Vector3d::Zero();  // x - y where the step begins
+  Eigen::Vector3d open_ = Eigen::Vector3d::Zero();   // rotation that this step leaves open
   PatchPlace own_, other_;
   Eigen::Vector3d other_arm_ = Eigen::Vector3d::Zero();  // y from the other body's position
   Eigen::Matrix<double, 6, 1> violation_;

@@ -49,6 +49,8 @@ TEST(KindOfFile, IsToldByTheFirstBytes) {
   EXPECT_THAT(kind_of_file("a", "\x89HDF\r\n\x1a\n"), HasSubstr("HDF5"));
   EXPECT_THAT(kind_of_file("a.json", "glTF\2\0\0\0"), HasSubstr("glTF"));
   EXPECT_THAT(kind_of_file("a", "PK\3\4"), HasSubstr("ZIP"));
+  EXPECT_EQ(kind_of_file("a.h5", "\x89PNG\r\n\x1a\n"), "a PNG image");
+  EXPECT_EQ(kind_of_file("a.obj", "\x1f\x8b\x08"), "a file that gzip packed");
   EXPECT_EQ(kind_of_file("a.h5", std::string(kPackMagic) + "..."), "a pack of a bundle");
   EXPECT_EQ(kind_of_file("a", "solid x\nfacet"), "an STL surface");
   EXPECT_EQ(kind_of_file("a.obj", "\n {\"bundle\""), kJson);
@@ -73,6 +75,8 @@ TEST(RefuseExtension, SaysTheWayToOneThatIsRead) {
   EXPECT_THAT(refusal("a.FBX"), AllOf(HasSubstr("'.fbx'"), HasSubstr("export it as .glb")));
   EXPECT_THAT(refusal("a.step"), HasSubstr("gmsh -3"));
   EXPECT_THAT(refusal("a.npz"), HasSubstr("from Python: exmat.precompute.write_mesh or exmat.precompute.bundle"));
+  EXPECT_THAT(refusal("a.obj.gz"), HasSubstr("gunzip"));
+  EXPECT_THAT(refusal("a.png"), HasSubstr("an image is no mesh"));
   EXPECT_THAT(refusal("a"), HasSubstr("no extension"));
 }
 

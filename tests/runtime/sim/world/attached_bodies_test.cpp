@@ -419,6 +419,38 @@ TEST(AttachedBodies, HoldAThousandTimesTheirMass) {
   EXPECT_GT(divided, 0);
 }
 
+// Soft bodies meet the ground so fast that the patches between them are pressed flat, and inside out: no rotation is
+// theirs there. Steps stay finite and gain no energy, and in the end the bodies are together as they were.
+TEST(AttachedBodies, ComeTogetherAgainAfterTheGroundPressedThemFlat) {
+  for (const double youngs_modulus : {1e3, 1e4})
+    for (const double rate : {60.0, 240.0})
+      for (const double tilt : {-0.9, -0.3, 0.4}) {
+        exmat::test::BarOptions options = Blocks::free_block();
+        options.youngs_modulus = youngs_modulus;
+        options.material = MaterialModel::kStableNeoHookean;
+        Blocks blocks(1 / rate, options);
+        blocks.scene.mass_damping = 2;
+        blocks.set_gravity(9.81);
+        blocks.add_floor(1e6, 0.3, 0);
+        const Eigen::Quaterniond turn(Eigen::AngleAxisd(tilt, Eigen::Vector3d::UnitY()));
+        const Eigen::Vector3d at(0, 0, 0.6), down(0, 0, -10), none(0, 0, 0),
+            next = turn * Eigen::Vector3d(kLength, 0, 0);
+        World world({blocks.body(at, down, none, turn), blocks.body(at + next, down, none, turn)}, {.stiffness = 1e6});
+        const Side own{blocks, 1, kStart}, other{blocks, 0, kEnd};
+        attach(world, own, other, AttachmentKind::kFixed);
+        const Open open(world, own, other);
+        const double start = world.energies().total(), scale = world.energies().kinetic;
+        const auto run = ::testing::Message() << youngs_modulus << " Pa, " << rate << " Hz, " << tilt;
+        for (int i = 0; i < 3 * rate; ++i) {
+          world.step(1);
+          ASSERT_EQ(world.report(0).status & kStepNonFinite, 0U) << run << ": " << i;
+          ASSERT_LE(world.energies().total(), start + 1e-6 * scale) << run << ": " << i;
+        }
+        EXPECT_LE(open.mean(world), 1e-10 * kLength) << run;
+        EXPECT_LE(open.turn(world), 1e-10) << run;
+      }
+}
+
 TEST(AttachedBodies, AreLetGoWithTheOneThatIsTakenOut) {
   const Blocks blocks(0.002);
   World world({blocks.body(Eigen::Vector3d(0, 0, 0)), blocks.body(Eigen::Vector3d(kLength, 0, 0)),
