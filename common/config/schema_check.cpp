@@ -2,7 +2,6 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <optional>
-#include <ranges>
 #include <stdexcept>
 #include <valijson/adapters/nlohmann_json_adapter.hpp>
 #include <valijson/schema.hpp>
@@ -237,7 +236,7 @@ void check_numbers(const Json& document, const std::filesystem::path& file) {
   const Json* const found = find_absurd(document, way);
   if (found == nullptr) return;
   Json::json_pointer place;
-  for (const std::string& member : way | std::views::reverse) place /= member;
+  for (auto member = way.rbegin(); member != way.rend(); ++member) place /= *member;
   throw InputError({file.string(), place.to_string(),
                     is_near(found->get<double>()) ? "0, or a number of at least 2.3e-308 in magnitude"
                                                   : fmt::format("a number of at most {:g} in magnitude", kFarthest),

@@ -210,7 +210,7 @@ std::vector<const LoadedAttachment*> attachments_of(const LoadedScene& kind, std
   std::vector<const LoadedAttachment*> found;
   for (const LoadedAttachment& own : kind.attachments)
     if (!own.only || *own.only == number) found.push_back(&own);
-  std::ranges::stable_partition(found, [](const LoadedAttachment* own) { return !own->other; });
+  std::stable_partition(found.begin(), found.end(), [](const LoadedAttachment* own) { return !own->other; });
   return found;
 }
 

@@ -15,7 +15,7 @@ constexpr std::array<std::array<int, 3>, 6> kAxisOrders{
     {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}}};
 
 TetMesh bar_mesh(const BarOptions& options) {
-  const auto [nx, ny, nz] = options.cells;
+  const int nx = options.cells[0], ny = options.cells[1], nz = options.cells[2];
   const auto index = [&](int i, int j, int k) { return (i * (ny + 1) + j) * (nz + 1) + k; };
   TetMesh mesh;
   mesh.vertices.resize((nx + 1) * (ny + 1) * (nz + 1), 3);

@@ -181,8 +181,8 @@ void World::move_attachments() {
 }
 
 std::span<const World::Link> World::links_of(const std::pair<int, int>& bodies) const noexcept {
-  const auto found = std::ranges::equal_range(links_, bodies, {}, &Link::bodies);
-  return {found.begin(), found.end()};
+  return {std::ranges::lower_bound(links_, bodies, {}, &Link::bodies),
+          std::ranges::upper_bound(links_, bodies, {}, &Link::bodies)};
 }
 
 /// Scratch for the first body of a kind that enters full space: later ones make theirs as they enter.
@@ -376,7 +376,8 @@ NewtonReport World::step_island(Island& island, int threads) {
 }
 
 NewtonReport World::step_in_parts(Island& island, int threads) {
-  auto& [bodies, numbers, pairs, near, incidences, held, workspace, newton, divided] = island;
+  const std::span<WorldBody* const> bodies = island.bodies;
+  const std::span<PairContact* const> pairs = island.pairs;
   std::deque<DividedStep> steps;
   for (const WorldBody* const own : bodies) steps.emplace_back(own->scene(), own->state);
   NewtonReport sum;
@@ -390,9 +391,9 @@ NewtonReport World::step_in_parts(Island& island, int threads) {
   const auto take = [&](int part) {
     for (DividedStep& step : steps) step.begin_part(part);
     gather_again(island, part == 0);
-    const NewtonReport own = begin_island_step(bodies, pairs, incidences, threads, workspace);
+    const NewtonReport own = begin_island_step(bodies, pairs, island.incidences, threads, island.workspace);
     const NewtonStatus before = sum.status;
-    runtime::add(end_island_step(bodies, pairs, incidences, own, workspace), sum);
+    runtime::add(end_island_step(bodies, pairs, island.incidences, own, island.workspace), sum);
     if (sum.status == NewtonStatus::kConverged) sum.status = before;
     std::uint32_t status = 0;
     for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -401,9 +402,9 @@ NewtonReport World::step_in_parts(Island& island, int threads) {
     }
     return status;
   };
-  divided = take_in_parts(begin, take);
-  if (!divided) take(0);
-  for (std::size_t i = 0; divided && i < bodies.size(); ++i) {
+  island.divided = take_in_parts(begin, take);
+  if (!island.divided) take(0);
+  for (std::size_t i = 0; island.divided && i < bodies.size(); ++i) {
     bodies[i]->report = steps[i].end();
     bodies[i]->take_scene(steps[i].scene());
   }

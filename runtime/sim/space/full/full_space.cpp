@@ -149,7 +149,7 @@ void FullSpace::order_vertices(const TetMesh& mesh, const FlagVector& fixed, Fix
   Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> block_order;
   Eigen::AMDOrdering<int>()(coarse, block_order);
   std::vector<int> in_order(block_order.indices().data(), block_order.indices().data() + blocks);
-  std::ranges::stable_partition(in_order, [&](int block) { return block < count / kFactorBlock; });
+  std::stable_partition(in_order.begin(), in_order.end(), [&](int block) { return block < count / kFactorBlock; });
   for (const int block : in_order)
     for (Eigen::Index k = kFactorBlock * block; k < std::min<Eigen::Index>(count, kFactorBlock * (block + 1)); ++k)
       vertex_of_.push_back(order.indices()[k]);
