@@ -58,20 +58,27 @@ is not known.
 SOURCES = {"time_step": "time step", "eigenfunctions": "eigenfunctions", "targets": "targets", "basis": "basis", "cubature": "cubature", "table": "table"}
 
 
-def measure(name, size, programs, output):
-    """Bundle, run, full space: what a row of the table holds."""
+def inputs(name):
+    """Asset and scene of SCENES, the scene with FRAMES frames of its trajectory."""
     folder_name, variant, material = SCENES[name]
-    source, folder = ROOT / "examples" / folder_name, output / name
-    folder.mkdir(parents=True, exist_ok=True)
+    source = ROOT / "examples" / folder_name
     scene = json.loads((source / f"scene_{variant}.json").read_text())
     asset = absolute(json.loads((source / f"asset_{variant}.json").read_text()), source)
     if material:
         asset["object"]["material"]["model"] = material
         asset["internal_force"] = "cubature"
+    return asset, scene | {"output": {"trajectory": "run.h5", "every": max(1, scene["steps"] // FRAMES)}}
+
+
+def measure(name, size, programs, output):
+    """Bundle, run, full space: what a row of the table holds."""
+    folder = output / name
+    folder.mkdir(parents=True, exist_ok=True)
+    asset, scene = inputs(name)
     if SIZES[size]:
         asset["basis"]["size"], asset["cubature"]["elements"] = SIZES[size]
     files = {part: f"{part}_{size}.json" for part in ("asset", "scene")}
-    scene |= {"bundle": f"{size}.h5", "output": {"trajectory": "run.h5", "every": max(1, scene["steps"] // FRAMES)}}
+    scene["bundle"] = f"{size}.h5"
     (folder / files["asset"]).write_text(json.dumps(asset, indent=1) + "\n")
     (folder / files["scene"]).write_text(json.dumps(scene, indent=1) + "\n")
     run(folder, programs / "exmat-precompute", "bundle", files["asset"], "-o", scene["bundle"], "--scene", files["scene"],

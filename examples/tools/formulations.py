@@ -13,26 +13,19 @@ import re
 import h5py
 import numpy as np
 
-from accuracy import SCENES
-from other_loads import ROOT, absolute, error, fitted, frames_of, mesh_of, run
+from accuracy import SCENES, inputs
+from other_loads import ROOT, error, fitted, frames_of, mesh_of, run
 
-FRAMES = 100
 PAGE = ROOT / "docs/studies/stiffness.md"
 HEAD = "| scene | Poisson ratio | lowest frequencies [Hz], linear | smoothed | smoothed over linear | most displacement, linear [m] | smoothed [m] | apart |\n"
 
 
 def measured(name, formulation, programs, folder):
     """Six lowest frequencies that are above 0, the frames and the mesh of a scene without a basis."""
-    folder_name, variant, material = SCENES[name]
-    source = ROOT / "examples" / folder_name
-    asset = absolute(json.loads((source / f"asset_{variant}.json").read_text()), source)
+    asset, scene = inputs(name)
     asset["object"]["formulation"] = formulation
     asset["basis"]["training"] = "none"
-    if material:
-        asset["object"]["material"]["model"] = material
-        asset["internal_force"] = "cubature"
-    scene = json.loads((source / f"scene_{variant}.json").read_text())
-    scene |= {"bundle": f"{formulation}.h5", "output": {"trajectory": "run.h5", "every": max(1, scene["steps"] // FRAMES)}}
+    scene["bundle"] = f"{formulation}.h5"
     (folder / "asset.json").write_text(json.dumps(asset, indent=1) + "\n")
     (folder / f"{formulation}.json").write_text(json.dumps(scene, indent=1) + "\n")
     if not (folder / f"{formulation}_full.h5").exists():

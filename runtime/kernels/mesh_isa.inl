@@ -1,6 +1,7 @@
 // Elements of a whole mesh, for kernels_isa.inl, which includes this file. A vertex is a register of four numbers, so
 // gathers and scatters need no shuffles but where four elements change into lanes of a law.
 
+// A vertex of doubles, and a group of such.
 #if EXMAT_SIMD_WIDTH == 2
 /// Two registers: GCC keeps vectors that are wider than its registers in memory.
 struct Quad {
@@ -20,11 +21,31 @@ inline void store_quad(double* p, Quad v) {
   store(p, v.low);
   store(p + 2, v.high);
 }
+template <Index c>
+inline Quad repeat_number(Quad v) {
+  const Vec half = c < 2 ? v.low : v.high, number = __builtin_shufflevector(half, half, c % 2, c % 2);
+  return {number, number};
+}
+inline void transpose(Quad* rows) {
+  const auto even = [](Vec a, Vec b) { return __builtin_shufflevector(a, b, 0, 2); };
+  const auto odd = [](Vec a, Vec b) { return __builtin_shufflevector(a, b, 1, 3); };
+  const Quad a = rows[0], b = rows[1], c = rows[2], d = rows[3];
+  rows[0] = {even(a.low, b.low), even(c.low, d.low)};
+  rows[1] = {odd(a.low, b.low), odd(c.low, d.low)};
+  rows[2] = {even(a.high, b.high), even(c.high, d.high)};
+  rows[3] = {odd(a.high, b.high), odd(c.high, d.high)};
+}
+using DoubleGroup = Quad;
+inline DoubleGroup load_group(const double* p) { return load_quad(p); }
+inline void store_group(double* p, DoubleGroup v) { store_quad(p, v); }
 #else
 using Quad = double __attribute__((vector_size(4 * sizeof(double))));
 using StoredQuad = Quad __attribute__((may_alias, aligned(alignof(double))));
 inline Quad load_quad(const double* p) { return *reinterpret_cast<const StoredQuad*>(p); }
 inline void store_quad(double* p, Quad v) { *reinterpret_cast<StoredQuad*>(p) = v; }
+using DoubleGroup = Vec;
+inline DoubleGroup load_group(const double* p) { return load(p); }
+inline void store_group(double* p, DoubleGroup v) { store(p, v); }
 #endif
 using FloatQuad = float __attribute__((vector_size(4 * sizeof(float))));
 using StoredFloatQuad = FloatQuad __attribute__((may_alias, aligned(alignof(float))));
@@ -36,16 +57,8 @@ using QuadOf = decltype(load_quad(static_cast<const Number*>(nullptr)));
 
 /// A group: as many vertices as a register holds, at least one.
 using FloatGroup = FloatVec;
-using DoubleGroup = std::conditional_t<(kWidth < 4), Quad, Vec>;
 inline FloatGroup load_group(const float* p) { return load(p); }
 inline void store_group(float* p, FloatGroup v) { store(p, v); }
-#if EXMAT_SIMD_WIDTH == 2
-inline DoubleGroup load_group(const double* p) { return load_quad(p); }
-inline void store_group(double* p, DoubleGroup v) { store_quad(p, v); }
-#else
-inline DoubleGroup load_group(const double* p) { return load(p); }
-inline void store_group(double* p, DoubleGroup v) { store(p, v); }
-#endif
 
 template <class Number>
 using GroupOf = decltype(load_group(static_cast<const Number*>(nullptr)));
@@ -63,13 +76,6 @@ inline Group repeat_number(Group v) {
   else
     return __builtin_shufflevector(v, v, c, c, c, c);
 }
-#if EXMAT_SIMD_WIDTH == 2
-template <Index c>
-inline Quad repeat_number(Quad v) {
-  const Vec half = c < 2 ? v.low : v.high, number = __builtin_shufflevector(half, half, c % 2, c % 2);
-  return {number, number};
-}
-#endif
 
 /// The vertices at places i and j of a, then those of b; in groups of four.
 template <Index i, Index j, class Group>
@@ -123,18 +129,6 @@ inline void transpose(Four* rows) {
   rows[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
   rows[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
-
-#if EXMAT_SIMD_WIDTH == 2
-inline void transpose(Quad* rows) {
-  const auto even = [](Vec a, Vec b) { return __builtin_shufflevector(a, b, 0, 2); };
-  const auto odd = [](Vec a, Vec b) { return __builtin_shufflevector(a, b, 1, 3); };
-  const Quad a = rows[0], b = rows[1], c = rows[2], d = rows[3];
-  rows[0] = {even(a.low, b.low), even(c.low, d.low)};
-  rows[1] = {odd(a.low, b.low), odd(c.low, d.low)};
-  rows[2] = {even(a.high, b.high), even(c.high, d.high)};
-  rows[3] = {odd(a.high, b.high), odd(c.high, d.high)};
-}
-#endif
 
 /// Transposes the 4 x 4 numbers of each place of four groups.
 template <class Group>

@@ -83,7 +83,7 @@ class LaneStep {
  private:
   enum class Hessian { kEvaluated, kFactorised, kStale };
 
-  /// Of a and b, of r modes.
+  /// Leaves out the unknowns of frames.
   LaneNumbers dot(const LaneVectors& a, const LaneVectors& b) const noexcept {
     return runtime::dot(model_.modes(), a.data(), b.data());
   }
@@ -386,8 +386,8 @@ class LaneStep {
       there_.value = (chosen != 0).select(there_.value + change, there_.value);
       kernels().lanes_take(model_.modes(), chosen.data(), next_frozen_.data(), frozen_.data());
     }
-    each([&](std::size_t l, Eigen::Index lane) {
-      if (meets(l) && chosen[lane] != 0) there_.value[lane] += model_.frame->accept_rigid(own_[l]->frame);
+    each_meeting(chosen, [&](std::size_t l, Eigen::Index lane) {
+      there_.value[lane] += model_.frame->accept_rigid(own_[l]->frame);
     });
   }
 
@@ -407,9 +407,7 @@ class LaneStep {
     });
     if (frames().exert_forces()) frames().add_stiffness(own(), fresh, meeting(), factor);
     if (rigid_ > 0) frames().set_rigid_rows(own(), meeting(), factor);
-    each([&](std::size_t l, Eigen::Index lane) {
-      if (meets(l) && fresh[lane] != 0) stiffen(l, lane, factor);
-    });
+    each_meeting(fresh, [&](std::size_t l, Eigen::Index lane) { stiffen(l, lane, factor); });
     kernels().lanes_cholesky(factor.data(), size);
     each([&](std::size_t l, Eigen::Index lane) {
       if (fresh[lane] == 0) return;

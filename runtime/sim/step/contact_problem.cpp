@@ -75,16 +75,13 @@ PotentialEvaluation ContactProblem::finish(const Eigen::VectorXd& x, const Poten
 
 PotentialValue ContactProblem::value(const Eigen::VectorXd& x) noexcept {
   const BodyPose pose = place(x);
-  return finish(x, pose, potential_.value(near_.q));
-}
-
-PotentialValue ContactProblem::finish(const Eigen::VectorXd& x, const BodyPose& pose, PotentialValue alone) noexcept {
+  PotentialValue value = potential_.value(near_.q);
   const double touching = model_.contact ? model_.contact->potential(pose, near_.contact) : 0;
   const double added = touching + spring_potential(state_.attachments, potential_.rate(), pose) +
                        frame_.rigid_potential(x, workspace_.frame);
-  alone.value += added;
-  alone.magnitude += std::abs(added);
-  return alone;
+  value.value += added;
+  value.magnitude += std::abs(added);
+  return value;
 }
 
 void ContactProblem::hessian(const Eigen::VectorXd& x, Tangent tangent, Eigen::MatrixXd& hessian) noexcept {

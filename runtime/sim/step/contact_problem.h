@@ -45,8 +45,6 @@ class ContactProblem {
   /// `alone` and its gradient in workspace.near->gradient_q, with what outside and a rigid motion add.
   PotentialEvaluation finish(const Eigen::VectorXd& x, const PotentialEvaluation& alone,
                              Eigen::VectorXd& gradient) noexcept;
-  /// value() of a body whose own is `alone`, at the pose of x.
-  PotentialValue finish(const Eigen::VectorXd& x, const BodyPose& pose, PotentialValue alone) noexcept;
   /// The elastic Hessian at a pose, into workspace.newton.
   void evaluate_elastic_hessian(const BodyPose& pose, Tangent tangent) noexcept;
   /// The stiffness of obstacles and springs, alone in workspace.near->stiffness.

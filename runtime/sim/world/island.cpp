@@ -587,10 +587,13 @@ NewtonReport solve_island(std::span<WorldBody* const> bodies, std::span<PairCont
                (total.status == NewtonStatus::kNonFinite && problem.has_hard());
   if (total.status == NewtonStatus::kConverged && is_doubtful(total, bodies))
     again = is_above_start(problem, bodies, workspace);
-  if (again) {
+  const auto minimise_from_rest = [&] {
     stay(bodies, workspace.x);
     for (WorldBody* const own : bodies) start_at(*own, workspace.x, own->state.q);
     add(minimise(problem, bodies, pairs, threads, workspace), total);
+  };
+  if (again) {
+    minimise_from_rest();
     if (total.status == NewtonStatus::kConverged && is_above_start(problem, bodies, workspace))
       total.status = NewtonStatus::kAboveStart;
   }
@@ -598,9 +601,7 @@ NewtonReport solve_island(std::span<WorldBody* const> bodies, std::span<PairCont
   for (const Eigen::Index conditions : {3, 0}) {
     if (!problem.has_hard() || (total.status != NewtonStatus::kNonFinite && workspace.x.allFinite())) break;
     problem.loosen(conditions);
-    stay(bodies, workspace.x);
-    for (WorldBody* const own : bodies) start_at(*own, workspace.x, own->state.q);
-    add(minimise(problem, bodies, pairs, threads, workspace), total);
+    minimise_from_rest();
     if (total.status == NewtonStatus::kConverged) total.status = NewtonStatus::kStagnated;
   }
   for (WorldBody* const own : bodies)

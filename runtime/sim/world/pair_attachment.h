@@ -21,9 +21,9 @@ class PairAttachment {
   void begin(Attachment& attachment, int side, const WorldBody& first, const WorldBody& second) noexcept;
 
   bool is_spring() const noexcept { return attachment_->kind == AttachmentKind::kSpring; }
-  /// Of its conditions the first: 3 on places, then 3 on rotations.
+  /// As many of its conditions hold in this step: the 3 on places come first, then the 3 on rotations.
   Eigen::Index conditions() const noexcept { return conditions_; }
-  /// Leaves out all but the first `most` in this step.
+  /// Lets no more than the first `most` hold.
   void loosen(Eigen::Index most) noexcept;
 
   // At the iterates of the bodies.

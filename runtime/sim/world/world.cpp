@@ -330,15 +330,15 @@ void World::step_crowd(int threads, StepObserver* observer) {
     if (!goes_alone(own)) crowd_.count(own.crowd_kind, *own.kind.scene);
   for (int i = 0; i < count(); ++i) {
     Member& own = at(i);
+    const bool alone = goes_alone(own);
     if (!is_in_island(i) && !own.asleep) {
-      // Scratch that all share stays in the cache.
-      Workspace* const scratch = !goes_alone(own) ? nullptr : own.touching ? &own.touching->workspace : own.held.get();
+      Workspace* scratch = nullptr;  // the crowd's, which all share, stays in the cache
+      if (alone) scratch = own.touching ? &own.touching->workspace : own.held.get();
       const FullModel* const full = own.state->full ? own.kind.full : nullptr;
-      crowd_.take(
-          {i, own.crowd_kind, own.kind.scene, own.state, scratch, &own.report, full, own.full.get(), goes_alone(own)});
+      crowd_.take({i, own.crowd_kind, own.kind.scene, own.state, scratch, &own.report, full, own.full.get(), alone});
       continue;
     }
-    if (!goes_alone(own)) crowd_.leave(own.crowd_kind, *own.kind.scene);
+    if (!alone) crowd_.leave(own.crowd_kind, *own.kind.scene);
     if (own.asleep) own.report = sleep_through(*own.kind.scene, *own.state);
   }
   crowd_.step(threads, observer, profile_);
