@@ -33,7 +33,7 @@ void add_solver(const TargetSolver& solver, int iterations, StepWork& work) {
 }
 
 /// Adds the work of one example force.
-void add_examples(const ExampleModel& examples, int target_iterations, const StepReport& report, StepWork& work) {
+void add_examples(const ExampleModel& examples, int target_iterations, StepWork& work) {
   const Eigen::Index modes = examples.filter.rows(), count = examples.weights.examples();
   const auto numbers = static_cast<double>(count * (modes + count));  // load, and the slopes of one turn
   work.weights_flops += 2 * numbers;
@@ -52,8 +52,7 @@ void add_examples(const Model& model, const StepScene& scene, const StepReport& 
   for (std::size_t i = 0; i < scene.examples.size(); ++i)
     if (acts(scene.examples[i]) && model.examples[i].target) ++solved;
   for (std::size_t i = 0; i < scene.examples.size(); ++i)
-    if (acts(scene.examples[i]))
-      add_examples(model.examples[i], report.target_iterations / std::max(1, solved), report, work);
+    if (acts(scene.examples[i])) add_examples(model.examples[i], report.target_iterations / std::max(1, solved), work);
 }
 
 }  // namespace

@@ -18,6 +18,7 @@ constexpr double kEntryShare = 0.01;
 // Bodies begin deep in each other where they overlap by this share of a thickness, with so many of their vertices.
 constexpr double kDeepStart = 0.25, kDeepShare = 0.1;
 constexpr double kOnSurface = 1e-9;  // of a radius
+constexpr double kMuchFarther = 2;   // a way out, than another one that takes its place
 
 constexpr double kSearchedMargins = 1;   // beyond what a step needs: some steps of what it moves by,
 constexpr double kSearchedShare = 2e-3;  // and of the surface's radius: many steps of bodies that hardly move
@@ -40,9 +41,10 @@ void take_stretch(const HeldBodyContact& held, const Eigen::Matrix3d& rotation, 
   if (length > 0) candidate.anchor -= held.stretch.norm() / length * along;
 }
 
-/// For a vertex that is inside, of which a part of the surface alone may tell that it is outside.
-void put_inside(SurfaceHit& hit) {
-  if (hit.distance <= 0) return;
+/// For a vertex that is inside, of which a part of the surface alone may tell that it is outside. On that part it is
+/// neither: its normal is that of the surface.
+void put_inside(double radius, SurfaceHit& hit) {
+  if (hit.distance <= kOnSurface * radius) return;
   hit.distance = -hit.distance;
   hit.normal = -hit.normal;
 }
@@ -56,7 +58,7 @@ std::optional<SurfaceHit> nearest_facing(const BodySurface& surface, const Eigen
   if (!hit || hit->distance >= 0 || hit->normal.dot(looks) <= 0) return hit;
   auto facing = surface.nearest(point, radius, shape, &looks);
   if (!facing || std::abs(facing->distance) > deepest) return hit;
-  put_inside(*facing);
+  put_inside(radius, *facing);
   return facing;
 }
 
@@ -67,7 +69,7 @@ std::optional<SurfaceHit> nearest_on_way_out(const BodySurface& surface, const E
   if (!hit || hit->distance > kOnSurface * radius) return hit;
   auto side = surface.nearest_looking(point, radius, shape, out);
   if (!side) return hit;
-  put_inside(*side);
+  put_inside(radius, *side);
   return side;
 }
 
@@ -81,7 +83,7 @@ std::optional<SurfaceHit> nearest_by_side(const BodySurface& surface, const Eige
   const Eigen::Vector3d far_side = -side;
   auto entry = surface.nearest(point, radius, shape, &far_side);
   if (!entry) return hit;
-  put_inside(*entry);
+  put_inside(radius, *entry);
   return entry->normal.dot(side) > 0 ? entry : hit;
 }
 
@@ -137,6 +139,14 @@ struct Gathering {
     return last != held.end() && last->vertex == vertex ? &*last : nullptr;
   }
 
+  /// A vertex that leaves the other body by the way out of what overlaps.
+  void leave(const Placed& at, const HeldBodyContact* before) {
+    auto hit = b.touching.surface.nearest(at.point, 2 * surface_radius, shape);
+    const bool is_inside = hit && hit->distance <= kOnSurface * surface_radius;
+    if (is_inside) hit = b.touching.surface.exit(at.point, *way_out, 4 * surface_radius, shape);
+    take(at, before, hit, is_inside);
+  }
+
   void test_other(int vertex) {
     const HeldBodyContact* const before = held_of(vertex);
     const Placed at = placed(vertex);
@@ -144,9 +154,17 @@ struct Gathering {
     const BodySurface& surface = b.touching.surface;
     const Eigen::Vector3d looks =
         b.pose.rotation.transpose() * (a.pose.rotation * a.touching.normals.row(vertex).transpose());
-    if (way_out || (before != nullptr && before->overlap > 0)) {
-      const Eigen::Vector3d out = way_out ? *way_out : before->normal;
-      return take(at, before, nearest_on_way_out(surface, at.point, out, margin + depth, shape));
+    const bool overlapped = anew || (before != nullptr && before->overlap > 0);
+    if (way_out && overlapped) return leave(at, before);
+    if (overlapped && before != nullptr)
+      return take(at, before, nearest_on_way_out(surface, at.point, before->normal, margin + depth, shape));
+    if (way_out && before == nullptr) {
+      // On its way out the back of a body goes through the other one.
+      const auto back = surface.nearest(at.point, margin, shape);
+      if (back && back->normal.dot(*way_out) < kOtherSide) {
+        if (back->distance <= 0) leave(at, before);
+        return;
+      }
     }
     if (before != nullptr)
       return take(at, before, nearest_by_side(surface, at.point, looks, before->normal, margin + depth, shape));
@@ -173,8 +191,9 @@ struct Gathering {
   }
   void test(int vertex) { own ? test_own(vertex) : test_other(vertex); }
 
-  /// A candidate, where what was found of the surface is near enough.
-  void take(const Placed& at, const HeldBodyContact* before, const std::optional<SurfaceHit>& hit) {
+  /// A candidate, where what was found of the surface is near enough. `leaves`: it is inside, on its way out.
+  void take(const Placed& at, const HeldBodyContact* before, const std::optional<SurfaceHit>& hit,
+            bool leaves = false) {
     if (!hit || hit->distance > margin) return;
     const int vertex = at.vertex;
     const bool was_inside = before != nullptr;
@@ -195,7 +214,8 @@ struct Gathering {
         a.set.world_velocity(vertex, at.arm, a.pose, a.velocity) - b.velocity.at(arm_b) - own_b;
     SurfacePoint surface{hit->distance, b.pose.rotation * hit->normal, Eigen::Vector3d::Zero()};
     const double way = time_step * apart.norm();
-    if (!own && !anew && !was_inside && -hit->distance > deepest_that_comes_in(way)) return candidates.all.pop_back();
+    if (!own && !anew && !was_inside && !leaves && -hit->distance > deepest_that_comes_in(way))
+      return candidates.all.pop_back();
     if (!own && !was_inside && hit->distance > 0 && way > std::max(hit->distance, kFast * surface_radius)) {
       const Eigen::Vector3d heading = kContactMarginSteps * time_step * (b.pose.rotation.transpose() * apart);
       const auto met = first_meeting(at.point, at.point + heading, [&](const Eigen::Vector3d& from, double left) {
@@ -209,10 +229,10 @@ struct Gathering {
     const Eigen::Vector3d place = at.offset - arm_b;
     freeze_contact(law, surface, place, place + time_step * apart, a.set.area(vertex), time_step, candidate);
     const double depth = -surface.distance;
-    const double inside = was_inside ? kept_overlap(*before, depth)
-                          : anew     ? depth
-                          : overlaps ? std::max(0.0, depth - way)
-                                     : 0;
+    const double inside = was_inside       ? kept_overlap(*before, depth)
+                          : anew || leaves ? depth
+                          : overlaps       ? std::max(0.0, depth - way)
+                                           : 0;
     candidate.release_overlap(depth, inside, time_step * surface.normal.dot(apart), pressed, time_step * law.release);
     if (!was_inside) return;
     if (candidate.rubs()) candidate.friction_force = law.friction * before->normal_force;
@@ -337,26 +357,34 @@ bool overlap(const std::vector<HeldBodyContact>& held) noexcept {
   return std::ranges::any_of(held, [](const HeldBodyContact& contact) { return contact.overlap > 0; });
 }
 
-std::optional<Eigen::Vector3d> way_out_of(const TouchingBody& a, const TouchingBody& b) {
+std::optional<Eigen::Vector3d> way_out_of(const TouchingBody& a, const TouchingBody& b,
+                                          const std::optional<Eigen::Vector3d>& kept) {
   struct Extent {
-    Eigen::Array3d least = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity()), most = -least;
+    double least = std::numeric_limits<double>::infinity(), most = -least;
   };
-  const auto extent_of = [&](const TouchingBody& body) {  // along the axes of a
+  const auto extent_of = [&](const TouchingBody& body, const Eigen::Vector3d& axis) {
     Extent extent;
     for (int vertex = 0; vertex < body.set.vertices(); ++vertex) {
       const Eigen::Vector3d place = body.pose.position + body.set.world_arm(vertex, body.pose) - a.pose.position;
-      const Eigen::Array3d own = (a.pose.rotation.transpose() * place).array();
-      extent.least = extent.least.min(own);
-      extent.most = extent.most.max(own);
+      extent.least = std::min(extent.least, axis.dot(place));
+      extent.most = std::max(extent.most, axis.dot(place));
     }
     return extent;
   };
-  const Extent own = extent_of(a), other = extent_of(b);
-  const Eigen::Array3d up = other.most - own.least, down = own.most - other.least;  // ways out along each axis
-  Eigen::Index axis = 0;
-  const double shortest = up.min(down).minCoeff(&axis);
-  if (!(shortest > kDeepStart * (own.most - own.least).min(other.most - other.least)[axis])) return std::nullopt;
-  return (up[axis] <= down[axis] ? 1 : -1) * a.pose.rotation.col(axis);
+  double shortest = std::numeric_limits<double>::infinity();
+  Eigen::Vector3d out;
+  bool deep = false;
+  for (int i = 0; i < 3; ++i) {
+    const Eigen::Vector3d axis = a.pose.rotation.col(i);
+    const Extent own = extent_of(a, axis), other = extent_of(b, axis);
+    const double up = other.most - own.least, down = own.most - other.least, way = std::min(up, down);
+    if (!(way < shortest)) continue;
+    shortest = way;
+    out = up <= down ? axis : Eigen::Vector3d(-axis);
+    deep = way > kDeepStart * std::min(own.most - own.least, other.most - other.least);
+  }
+  if (!kept) return deep ? std::optional(out) : std::nullopt;
+  return extent_of(b, *kept).most - extent_of(a, *kept).least > kMuchFarther * shortest ? out : kept;
 }
 
 void BodyContact::gather(const TouchingBody& a, const TouchingBody& b, const CandidateSearch& search,
@@ -365,7 +393,7 @@ void BodyContact::gather(const TouchingBody& a, const TouchingBody& b, const Can
   SurfaceShape& shape = search.shape;
   NearVertices& near = search.near;
   Gathering gathering{law_, a, b, search, margin, /*own=*/false, candidates};
-  if (search.way_out && gathering.share_inside() >= kDeepShare)
+  if (search.way_out && (!search.anew || gathering.share_inside() >= kDeepShare))
     gathering.way_out = b.pose.rotation.transpose() * *search.way_out;
   const auto test_all = [&](double radius) {
     for_near(a, b, radius, shape, [&](int vertex) { gathering.test_other(vertex); });

@@ -135,14 +135,17 @@ struct CandidateSearch {
   const std::vector<HeldBodyContact>& held;  ///< vertices that were inside in the last step
   SurfaceShape& shape;                       ///< that of b, placed
   NearVertices& near;                        ///< found by earlier searches; the candidates are the same without
-  std::optional<Eigen::Vector3d> way_out{};  ///< way_out_of(a, b) where there is no last step
-  double gravity = 0;                        ///< [m/s^2]
+  /// The way by which a leaves b, world: way_out_of(a, b) where there is no last step, that of what overlaps after it.
+  std::optional<Eigen::Vector3d> way_out{};
+  double gravity = 0;  ///< [m/s^2]
 };
 
-/// The unit vector, world, along which `a` comes out of `b` soonest, axes of the bounding box of `a` taken; none where
-/// it is less than a quarter of its own thickness inside. Nearest points of the surface push vertices of bodies that
-/// lie deep in each other to all sides, and part nothing. way_out_of(b, a) may be another one.
-std::optional<Eigen::Vector3d> way_out_of(const TouchingBody& a, const TouchingBody& b);
+/// The unit vector, world, along which `a` comes out of `b` soonest, axes of the bounding box of `a` taken. Nearest
+/// points of the surface push vertices of bodies that lie deep in each other to all sides, and part nothing. With
+/// `kept`, a way that serves already: that, unless another one is much shorter; without, none where it is less than a
+/// quarter of its own thickness inside. way_out_of(b, a) may be another one.
+std::optional<Eigen::Vector3d> way_out_of(const TouchingBody& a, const TouchingBody& b,
+                                          const std::optional<Eigen::Vector3d>& kept = std::nullopt);
 
 /// Contact of the vertices of one body, `a`, with the surface of another, `b`, which may be the same kind of body.
 /// Forces are equal and opposite, at the vertex and at y. docs/step_in_detail.md, "Bodies that touch".

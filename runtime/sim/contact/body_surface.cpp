@@ -13,6 +13,7 @@
 
 #include "common/mesh/geometry.h"
 #include "runtime/kernels/kernels.h"
+#include "runtime/sim/contact/first_meeting.h"
 #include "runtime/sim/contact/nearest_on_triangle.h"
 
 namespace exmat::runtime {
@@ -23,6 +24,7 @@ constexpr int kLeafTriangles = kLanes;
 constexpr int kBlockTriangles = 64;  // whose vertices are moved together
 constexpr int kManyLooks = 64;       // a search costs about half a microsecond, all boxes twenty
 constexpr double kSameWay = 0.5;     // cosine
+constexpr double kGrazing = 0.1;     // cosine
 // (a + b)^2 <= (1 + kWayShare) a^2 + (1 + 1 / kWayShare) b^2, b the way that is left.
 constexpr double kWayShare = 0.3;
 
@@ -352,6 +354,27 @@ std::optional<SurfaceHit> BodySurface::nearest_looking(const Eigen::Vector3d& po
                                                        const Eigen::Vector3d& way) const noexcept {
   return search(point, radius, shape,
                 [&](int triangle, const TrianglePoint&) { return looks_along(triangle, way, shape); }, {});
+}
+
+std::optional<SurfaceHit> BodySurface::exit(const Eigen::Vector3d& point, const Eigen::Vector3d& way, double most,
+                                            SurfaceShape& shape) const noexcept {
+  const auto from_inside = [&](const Eigen::Vector3d& at, double left) {
+    auto hit = nearest(at, left, shape);
+    if (hit) *hit = {hit->triangle, hit->barycentric, std::max(0.0, -hit->distance), -hit->normal};
+    return hit;
+  };
+  auto left = first_meeting(point, point + most * way, from_inside);
+  if (!left) return left;
+  const auto corner = [&](int c) { return position(triangles_(left->triangle, c), shape); };
+  const Eigen::Vector3d a = corner(0), ab = corner(1) - a, ac = corner(2) - a, across = ab.cross(ac), from = point - a;
+  const double approach = across.dot(way);
+  if (!(approach > kGrazing * across.norm())) return std::nullopt;
+  // The point of its plane on the ray, by which forces along `way` turn neither body.
+  const double distance = -across.dot(from) / approach;
+  const Eigen::Vector3d on = from + distance * way;
+  const double square = across.squaredNorm();
+  const double second = on.cross(ac).dot(across) / square, third = ab.cross(on).dot(across) / square;
+  return SurfaceHit{left->triangle, {1 - second - third, second, third}, -std::max(0.0, distance), way};
 }
 
 /// A search for what is nearer than half of its distance at rest, or may be once it has moved by `way` [m].

@@ -123,6 +123,11 @@ class BodySurface {
   std::optional<SurfaceHit> nearest_looking(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
                                             const Eigen::Vector3d& way) const noexcept;
 
+  /// Where the ray from a point inside leaves the surface first, along a unit vector `way`, which is the normal of what
+  /// is found; at most `most` [m] away. Nothing where it grazes the surface.
+  std::optional<SurfaceHit> exit(const Eigen::Vector3d& point, const Eigen::Vector3d& way, double most,
+                                 SurfaceShape& shape) const noexcept;
+
   /// nearest() for a point of the body itself, at rest at `rest`: of the surface that has come nearer to it than half
   /// of how far away it is at rest, and does not look the same way as the surface at `place`, its own. No neighbour is,
   /// as long as nothing is compressed to half its length. With `closing`, of a shape that moves, what is not far by it.

@@ -10,6 +10,9 @@
 namespace exmat::runtime {
 namespace {
 
+constexpr double kOneWay = 0.5;        // of the ways out of what overlaps, by its depth, in the sum of all of them
+constexpr double kDeepOverlap = 0.05;  // of a radius
+
 /// Calls work(a, b) with the two bodies at their iterates as contacts see them.
 template <class Work>
 auto see(const WorldBody& first, const WorldBody& second, const Work& work) {
@@ -20,6 +23,24 @@ auto see(const WorldBody& first, const WorldBody& second, const Work& work) {
   };
   if (first.full) return with_second(first.full_side());
   return with_second(ReducedSide{first.contact(), first_pose, first.rigid()});
+}
+
+/// The way by which the first body leaves the second, world: the one that their overlaps have, as long as it is no
+/// detour. Shallow ones that have none, as of a peg in its hole, are released where they are.
+std::optional<Eigen::Vector3d> way_out_of(const HeldPair& pair, const TouchingBody& first, const TouchingBody& second) {
+  Eigen::Vector3d way = Eigen::Vector3d::Zero();
+  double all = 0, deepest = 0;
+  for (std::size_t side = 0; side < 2; ++side)
+    for (const HeldBodyContact& contact : pair.held[side]) {
+      way += (side == 0 ? contact.overlap : -contact.overlap) *
+             ((side == 0 ? second : first).pose.rotation * contact.normal);
+      all += contact.overlap;
+      deepest = std::max(deepest, contact.overlap);
+    }
+  if (all > 0 && way.norm() > kOneWay * all) return way_out_of(first, second, way.normalized());
+  const auto radius = [](const TouchingBody& body) { return body.touching.surface.bound(body.pose.q).radius; };
+  if (!(deepest > kDeepOverlap * std::min(radius(first), radius(second)))) return std::nullopt;
+  return way_out_of(first, second);
 }
 
 /// Columns about world axes become those of the unknowns.
@@ -65,11 +86,13 @@ void PairContact::gather(const ContactLaw& law, int side, const WorldBody& own, 
     return;
   }
   const TouchingBody its_own = own.touching_body(), its_other = other.touching_body();
-  if (search.anew) {
-    const bool is_first = side == 0;
-    search.way_out = way_out_of(is_first ? its_own : its_other, is_first ? its_other : its_own);
-    if (search.way_out && !is_first) *search.way_out *= -1;
-  }
+  const bool is_first = side == 0;
+  const TouchingBody &first = is_first ? its_own : its_other, &second = is_first ? its_other : its_own;
+  if (search.anew)
+    search.way_out = way_out_of(first, second);
+  else if (held_ != nullptr)
+    search.way_out = way_out_of(*held_, first, second);
+  if (search.way_out && !is_first) *search.way_out *= -1;
   contact.gather(its_own, its_other, search, candidates_[at]);
 }
 

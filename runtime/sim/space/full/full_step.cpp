@@ -795,6 +795,7 @@ const FullReport& FullStep::finish(const FrameMomenta& others) noexcept {
   if (model_.rigid && !unbalanced && !is_attached()) correct_momenta(others);
   if (limited)
     limit_energy(energy, closed ? memory_.found->end_energy(Eigen::Vector3d::Zero()) : 0, unbalanced ? 0 : kGain);
+  if (!state_.v.allFinite()) report_.status |= kStepNonFinite;  // by what momenta and energies make of it
   end_attachments();
   if (model_.skin) end_bones();
   if (!near_ && memory_.held != nullptr) memory_.held->count = 0;

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include "tests/runtime/sim/world/fork.h"
 #include "tests/runtime/sim/world/touching_blocks.h"
+#include "tests/support/random.h"
 
 namespace exmat::runtime {
 namespace {
@@ -93,6 +95,33 @@ TEST(Release, BodiesThatBeginDeepInEachOtherPart) {
       fastest_of(blocks, world);  // another second
       EXPECT_TRUE(world.held().empty());
       EXPECT_GE((blocks.centre(world.state(0)) - blocks.centre(world.state(1))).norm(), 0.2);
+    }
+}
+
+// Vertices on the surface that were taken for inside, those that came in by the back of a body on its way out, and ways
+// out that differed from vertex to vertex kept most of them in each other; other limbs of bodies that are not convex
+// did.
+TEST(Release, TurnedBodiesThatBeginInEachOtherPart) {
+  for (const bool forks : {false, true})
+    for (int seed = 0; seed < 20; ++seed) {
+      const Eigen::VectorXd chosen = test::random_vector(8, 100 + seed);
+      SCOPED_TRACE(testing::Message() << "forks " << forks << ", seed " << seed);
+      exmat::test::BarOptions options = forks ? test::fork(/*free=*/true) : Blocks::free_block();
+      options.youngs_modulus = std::pow(10.0, 4 + seed % 4);
+      const Blocks blocks(seed % 2 == 0 ? 1.0 / 240 : 1.0 / 60, options);
+      Eigen::Quaterniond turn(chosen.head<4>());
+      // Also about an axis of both, and on each other.
+      if (seed < 3) turn = Eigen::AngleAxisd(seed == 0 ? EIGEN_PI : 0.5, Eigen::Vector3d::Unit(seed));
+      const Eigen::Vector3d apart = seed < 10 ? Eigen::Vector3d::Zero() : Eigen::Vector3d(0.1 * chosen.tail<3>());
+      World world({blocks.body({0, 0, 0}), blocks.body(apart, {0, 0, 0}, {0, 0, 0}, turn.normalized())},
+                  {1e7, 0, chosen[4] > 0 ? 0.5 : 0.0});
+      for (int second = 0; second < 3; ++second) EXPECT_LE(fastest_of(blocks, world), 2 * kRelease);
+      // Prongs may still touch.
+      for (const HeldPair& pair : world.held()) {
+        EXPECT_FALSE(pair.overlaps());
+        for (const auto& held : pair.held)
+          for (const HeldBodyContact& contact : held) EXPECT_GT(contact.gap, -1e-3);
+      }
     }
 }
 
