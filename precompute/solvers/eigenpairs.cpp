@@ -221,17 +221,9 @@ class TeamProblem {
     fields.leftCols(found.cols()) = found;
     fields.rightCols(1) = solver_.solve(start_vector(solver_.size(), 1 + static_cast<unsigned>(found.cols())));
     announce({Task::kSearch, share_->id, {found.cols(), count}});
-    try {
-      Eigen::MatrixXd vectors = share_->search(fields, found.cols(), count);
-      require_options_taken();
-      return vectors;
-    } catch (const WorkError& error) {
-      if (solver_settings().options.empty()) throw;
-      log::debug(error.what());
-      throw InputError({"command line", words_of_options(), "options by which the eigenpairs are found",
-                        "values that the eigensolver refuses or fails with",
-                        "mend their values, or leave them out; --log-level debug says why"});
-    }
+    Eigen::MatrixXd vectors = share_->search(fields, found.cols(), count);
+    require_options_taken();
+    return vectors;
   }
 
  private:
@@ -314,6 +306,26 @@ Eigenpairs dense_eigenpairs(const SparseMatrix& stiffness, const SparseMatrix& m
   return std::move(polished.pairs);
 }
 
+/// By searches: more than one, since one may miss an eigenpair.
+Eigenpairs search_eigenpairs(const SparseMatrix& stiffness, const SparseMatrix& mass, const SemidefiniteSolver& solver,
+                             Eigen::Index count) {
+  const TeamProblem problem(stiffness, mass, solver);
+  Eigen::MatrixXd found = problem.search(Eigen::MatrixXd(solver.size(), 0), count);
+  Polished polished = polish(stiffness, mass, solver, found);
+  for (;;) {
+    Eigenpairs& pairs = polished.pairs;
+    const Eigen::MatrixXd extra = problem.search(pairs.vectors, 1);
+    if (rayleigh_quotient(stiffness, mass, extra.col(0)) >= (1 - kMissedMargin) * pairs.values[count - 1]) break;
+    found.resize(found.rows(), count + 1);
+    found << pairs.vectors, extra;
+    polished = polish(stiffness, mass, solver, found);
+    pairs = {pairs.values.head(count), pairs.vectors.leftCols(count)};
+  }
+  refine_where_coarse(stiffness, mass, solver, polished);
+  fix_signs(polished.pairs.vectors);
+  return std::move(polished.pairs);
+}
+
 }  // namespace
 
 EigenShare::EigenShare(const Call& call, SolverShare& used) : solver(used) { id = call.object; }
@@ -339,21 +351,15 @@ Eigen::MatrixXd EigenShare::search(const Eigen::MatrixXd& fields, Eigen::Index f
 Eigenpairs smallest_eigenpairs(const SparseMatrix& stiffness, const SparseMatrix& mass,
                                const SemidefiniteSolver& solver, Eigen::Index count) {
   if (2 * (count + solver.share().border) >= solver.size()) return dense_eigenpairs(stiffness, mass, solver, count);
-  const TeamProblem problem(stiffness, mass, solver);
-  Eigen::MatrixXd found = problem.search(Eigen::MatrixXd(solver.size(), 0), count);
-  Polished polished = polish(stiffness, mass, solver, found);
-  for (;;) {
-    Eigenpairs& pairs = polished.pairs;
-    const Eigen::MatrixXd extra = problem.search(pairs.vectors, 1);
-    if (rayleigh_quotient(stiffness, mass, extra.col(0)) >= (1 - kMissedMargin) * pairs.values[count - 1]) break;
-    found.resize(found.rows(), count + 1);
-    found << pairs.vectors, extra;
-    polished = polish(stiffness, mass, solver, found);
-    pairs = {pairs.values.head(count), pairs.vectors.leftCols(count)};
+  try {
+    return search_eigenpairs(stiffness, mass, solver, count);
+  } catch (const WorkError& error) {
+    if (solver_settings().options.empty()) throw;
+    log::debug(error.what());
+    throw InputError({"command line", words_of_options(), "options by which the eigenpairs are found",
+                      "values that the eigensolver refuses or fails with",
+                      "mend their values, or leave them out; --log-level debug says why"});
   }
-  refine_where_coarse(stiffness, mass, solver, polished);
-  fix_signs(polished.pairs.vectors);
-  return std::move(polished.pairs);
 }
 
 void fix_signs(Eigen::MatrixXd& columns) {

@@ -14,7 +14,7 @@
 namespace exmat::runtime {
 namespace {
 
-constexpr double kLayout = 5;
+constexpr double kLayout = 6;
 
 constexpr Eigen::VectorXd State::*kModeArrays[] = {&State::q, &State::v, &State::q_previous, &State::v_previous,
                                                    &State::a};
@@ -73,6 +73,7 @@ void visit(Archive& archive, Body& body) {
       archive.whole("contacts", state.contacts.count, static_cast<double>(state.contacts.held.size() + 1));
   const bool in_full_space = visit_space(archive, body);
   archive.load(state.elastic_energy);
+  archive.load(state.contacts.account);
   for (const auto member : kModeArrays) archive.array(state.*member);
   archive.load(state.applied_force);
   archive.load(state.vertex_force);

@@ -177,11 +177,12 @@ auto& hosted_of(auto& world, std::int64_t id) {
   return world.obstacles[static_cast<std::size_t>(place)];
 }
 
-/// Wakes the bodies that the obstacle may touch where it is now.
+/// Wakes the bodies that the obstacle may touch where it is now. None of them has paid for what its springs hold.
 void wake_near(exmat_world& world, const Obstacle& obstacle) noexcept {
   const double now = time_of(world);
   for (const exmat_world::Member& member : world.members) {
     exmat_body& body = *member.body;
+    body.state.contacts.account = ContactState::kUnbounded;
     if (!body.state.sleep.asleep || !body.model().contact || !obstacle.meeting.meets(body.scene.meeting)) continue;
     const PlacedObstacle placed(obstacle, now, body.scene.time_step);
     if (body.model().contact->may_meet(placed, pose_of(body.model(), body.state))) wake(body.state);
@@ -286,6 +287,7 @@ void meet_obstacles(exmat_body& body) {
   body.scene.obstacles.swap(obstacles);
   body.obstacle_ids.swap(ids);
   if (body.obstacle_ids != ids) body.state.contacts.count = 0;
+  body.state.contacts.account = ContactState::kUnbounded;
   fit(body);
   wake(body.state);
 }

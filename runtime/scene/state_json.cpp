@@ -73,6 +73,7 @@ class BodyReader {
     state.elastic_energy = body_["elastic_energy"];
     state.begins_anew = body_["begins_anew"];
     state.contacts.first_step = body_.value("anew", false);
+    state.contacts.account = body_.value("account", ContactState::kUnbounded);
     if (body_.contains("sleep"))
       state.sleep = {body_["sleep"]["asleep"], body_["sleep"]["still_steps"], body_["sleep"]["loads"]};
     const BodyFrame& frame = *loaded_.model->frame;
@@ -179,6 +180,7 @@ OrderedJson state_to_json(const State& state, const BodyFrame& frame) {
                    {"frame", frame.numbers(state.frame)},
                    {"examples", OrderedJson::array()},
                    {"contacts", OrderedJson::array()}};
+  if (state.contacts.account < ContactState::kUnbounded) body["account"] = state.contacts.account;
   for (const auto& [name, member] : kModeArrays) body[name] = array_of(state.*member);
   if (state.sleep.loads != 0)
     body["sleep"] = {

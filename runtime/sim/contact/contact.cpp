@@ -87,18 +87,20 @@ void ContactWorkspace::refresh_friction(FrictionChange& change) noexcept {
   }
 }
 
-double ContactWorkspace::start_energy() const noexcept {
-  double sum = 0;
-  for (const ContactCandidate& candidate : std::span(candidates).first(candidate_count))
+double ContactWorkspace::start_energy(const ContactState& state) const noexcept {
+  double sum = 0, released = 0;
+  for (const ContactCandidate& candidate : std::span(candidates).first(candidate_count)) {
     sum += stored_energy(candidate, candidate.start_gap, candidate.carried);
-  return sum;
+    released += candidate.released;
+  }
+  return state.first_step ? sum : std::min(sum, state.account + released);
 }
 
 double ContactWorkspace::end_energy(const Eigen::Vector3d& position) const noexcept {
   double sum = 0;
   for (const ContactCandidate& candidate : std::span(candidates).first(candidate_count))
     sum += stored_energy(candidate, candidate.gap, position + candidate.arm);
-  return sum;
+  return std::min(ContactState::kUnbounded, sum);
 }
 
 ContactSet::ContactSet(const ContactData& data, const Eigen::Vector3d& origin, double mass) {

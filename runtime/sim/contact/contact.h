@@ -81,9 +81,11 @@ struct ContactWorkspace : ContactSums {
   /// Takes lambda of candidates one by one from the last evaluation.
   void refresh_friction(FrictionChange& change) noexcept;
 
-  /// Energy that the springs hold where the step begins, after freeze(), of obstacles that do not move [J].
-  double start_energy() const noexcept;
-  /// The same where it ends, after commit() at arms beyond `position`.
+  /// Energy that the springs hold where the step begins, after freeze(), of obstacles that do not move, as far as the
+  /// state's account and what is released pay for it [J].
+  double start_energy(const ContactState& state) const noexcept;
+  /// The same where it ends, after commit() at arms beyond `position`, all of it; ContactState::kUnbounded where it
+  /// overflows.
   double end_energy(const Eigen::Vector3d& position) const noexcept;
 
   // Counts of the last gather().

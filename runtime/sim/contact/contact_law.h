@@ -63,6 +63,10 @@ struct ContactState {
   std::size_t count = 0;
   NearPlanes near_planes;  ///< saves searches; results are the same without
   bool first_step = true;  ///< True until the first step after the body was placed by hand.
+  /// The most that the springs may hold where the next step begins [J]: what the body has put into them. Negative where
+  /// it has got more from them. kUnbounded: what they do hold.
+  double account = kUnbounded;
+  static constexpr double kUnbounded = std::numeric_limits<double>::max();
 
   /// Distance of the farthest of them from the surface that it came in by, where that is not the nearest [m].
   double longest_way_out() const noexcept;

@@ -206,21 +206,27 @@ NewtonReport BodyStep::solve() noexcept {
 StepReport BodyStep::finish(const NewtonReport& newton) noexcept {
   const bool unbalanced = near_ && !held_ && newton.status != NewtonStatus::kConverged;
   const bool closed = near_ && !held_ && !model_.frame->is_driven() && workspace_.near->contact.loaded_count > 0 &&
-                      state_.contacts.longest_way_out() == 0 && is_isolated(scene_, state_, workspace_.near->contact);
+                      is_isolated(scene_, state_, workspace_.near->contact);
   const Energies before = unbalanced || closed ? energies(model_, scene_, state_) : Energies{};
-  const double springs = closed ? workspace_.near->contact.start_energy() : 0;
+  const double springs = closed ? workspace_.near->contact.start_energy(state_.contacts) : 0;
   take(newton);
-  if ((unbalanced || closed) && (report_.status & kStepNonFinite) == 0) {
+  const bool finite = (report_.status & kStepNonFinite) == 0;
+  const double held =
+      near_ && finite ? workspace_.near->contact.end_energy(model_.frame->placement(state_.frame).position) : 0;
+  if (finite) state_.contacts.account = held;
+  if ((unbalanced || closed) && finite) {
     const Energies now = energies(model_, scene_, state_);
     double allowed = before.total() - now.elastic - now.potential, rounding = 0;
+    const double all = allowed + springs;
     if (closed) {
       // Springs of vertices that the step has brought deep, as through an edge, were paid for by nobody.
-      const double held = workspace_.near->contact.end_energy(model_.frame->placement(state_.frame).position);
       allowed += unbalanced ? std::min(0.0, springs - held) : springs - held;
       if (!unbalanced)
         rounding = kEnergyRounding * (std::abs(before.total() + springs) + before.kinetic + springs + held);
     }
-    if (now.kinetic > allowed + rounding) limit_kinetic_energy(allowed);
+    const bool gains = now.kinetic > allowed + rounding;
+    if (gains) limit_kinetic_energy(allowed);
+    if (closed) state_.contacts.account = std::min(held, all - (gains ? std::max(0.0, allowed) : now.kinetic));
   }
   if (rests(model_, scene_, report_, state_)) put_to_sleep(model_, state_, workspace_);
   return report_;

@@ -91,6 +91,7 @@ void carry_contacts(const StepScene& scene, const Placement& from, const Placeme
     held.anchor = pose.to_frame(to.position + turn * (pose.to_world(held.anchor) - from.position));
     held.way_out.setZero();
   }
+  state.contacts.account = ContactState::kUnbounded;
 }
 
 void commit_contacts(const Model& model, bool near, Workspace& workspace, State& state) noexcept {

@@ -639,11 +639,14 @@ bool is_isolated(std::span<WorldBody* const> bodies) noexcept {
   });
 }
 
-/// Energy of the springs of obstacles where the step has led [J].
-double obstacle_energy(std::span<WorldBody* const> bodies) noexcept {
+/// Energy of the springs of obstacles where the step has led [J], which becomes the bodies' accounts.
+double end_obstacles(std::span<WorldBody* const> bodies) noexcept {
   double sum = 0;
-  for (const WorldBody* const own : bodies)
-    sum += own->near().contact.end_energy(own->model.frame->placement(own->state.frame).position);
+  for (WorldBody* const own : bodies) {
+    double& account = own->state.contacts.account;
+    account = own->near().contact.end_energy(own->model.frame->placement(own->state.frame).position);
+    sum += account;
+  }
   return sum;
 }
 
@@ -761,7 +764,8 @@ NewtonReport begin_island_step(std::span<WorldBody* const> bodies, std::span<Pai
   workspace.start = start_accounts(bodies, pairs);
   workspace.start.isolated = is_isolated(bodies);
   if (workspace.start.isolated)
-    for (const WorldBody* const own : bodies) workspace.start.obstacles += own->near().contact.start_energy();
+    for (const WorldBody* const own : bodies)
+      workspace.start.obstacles += own->near().contact.start_energy(own->state.contacts);
   return solve_island(bodies, pairs, incidences, threads, workspace);
 }
 
@@ -809,7 +813,7 @@ NewtonReport end_island_step(std::span<WorldBody* const> bodies, std::span<PairC
   }
   const auto is_finite = [](const WorldBody* own) { return (own->report.status & kStepNonFinite) == 0; };
   if (std::ranges::all_of(bodies, is_finite)) {
-    const double obstacles = start.isolated ? obstacle_energy(bodies) : 0;
+    const double springs = end_obstacles(bodies), obstacles = start.isolated ? springs : 0;
     const double allowed =
         start.bodies.total + start.obstacles - obstacles + (converged ? start.accounts : start.springs);
     const double rounding =

@@ -156,9 +156,9 @@ TEST_F(BadBodyState, IsRefusedAndTheBodyIsAsItWas) {
     return "taken";
   };
   EXPECT_THAT(refusal(good.size(), 0), HasSubstr("expected"));
-  EXPECT_THAT(refusal(8, std::numeric_limits<double>::infinity()),
+  EXPECT_THAT(refusal(9, std::numeric_limits<double>::infinity()),
               HasSubstr("numbers: inf: expected finite ones of at most 1e+30"));
-  EXPECT_THAT(refusal(0, 1), HasSubstr("layout 1: expected 5"));
+  EXPECT_THAT(refusal(0, 1), HasSubstr("layout 1: expected 6"));
   EXPECT_THAT(refusal(1, 0.02), HasSubstr("time step 0.02 s: expected 0.01 s, the model's"));
   EXPECT_THAT(refusal(2, 0.5), HasSubstr("steps = 0.5: expected a whole number"));
   EXPECT_THAT(refusal(3, 2), HasSubstr("begins_anew = 2: expected 0 or 1"));
@@ -167,7 +167,7 @@ TEST_F(BadBodyState, IsRefusedAndTheBodyIsAsItWas) {
   EXPECT_THAT(refusal(good.size() - 10, 1e6), HasSubstr("vertex = 1e+06: expected a whole number below"));
   EXPECT_THAT(refusal(good.size() - 9, 1), HasSubstr("obstacle = 1: expected a whole number below 1"));
   EXPECT_EQ(refusal(6, good[6]), "taken");
-  EXPECT_THAT(refusal(8, 1e31), HasSubstr("numbers: 1e+31: expected finite ones of at most 1e+30"));
+  EXPECT_THAT(refusal(9, 1e31), HasSubstr("numbers: 1e+31: expected finite ones of at most 1e+30"));
 }
 
 class ExamplesOfABody : public BodyStates {

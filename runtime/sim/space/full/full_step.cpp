@@ -723,19 +723,22 @@ void FullStep::move_centre(const Eigen::Vector3d& velocity) noexcept {
 
 // True if nothing but gravity and obstacles that stand still, which it touches, changes the energy of the body.
 bool FullStep::is_closed() const noexcept {
-  return memory_.found->loaded_count > 0 && memory_.held->longest_way_out() == 0 && state_.applied_force.isZero(0) &&
+  return memory_.found->loaded_count > 0 && state_.applied_force.isZero(0) &&
          is_isolated(scene_, *memory_.found);
 }
 
 // A solution that did not converge may hold contact forces that throw the body, and springs of vertices that a step has
-// brought deep, as through an edge, were paid for by nobody: the body goes no faster than `allowed` leaves it.
-void FullStep::limit_energy(double allowed, double springs, double gain) noexcept {
+// brought deep, as through an edge, were paid for by nobody: the body goes no faster than `allowed` leaves it. Returns
+// the energy that it has beside the springs.
+double FullStep::limit_energy(double allowed, double springs, double gain) noexcept {
   const Energies now = energies_of(model_, scene_, state_, memory_.bones);
   const double held = now.elastic + now.potential + springs;
   const double rounding = gain * (std::abs(allowed) + now.kinetic + std::abs(held));
-  if (!(now.kinetic > 0) || now.kinetic + held <= allowed + rounding) return;
-  state_.v *= std::sqrt(std::max(0.0, allowed - held) / now.kinetic);
+  if (!(now.kinetic > 0) || now.kinetic + held <= allowed + rounding) return now.total();
+  const double kinetic = std::max(0.0, allowed - held);
+  state_.v *= std::sqrt(kinetic / now.kinetic);
   space_.to_field(state_.v, workspace_.field);
+  return kinetic + held - springs;
 }
 
 void FullStep::end_attachments() noexcept {
@@ -775,7 +778,7 @@ const FullReport& FullStep::finish(const FrameMomenta& others) noexcept {
   const bool is_own = near_ && !among_others_ && !is_attached() && !model_.is_driven();
   const bool closed = is_own && is_closed(), limited = is_own && (closed || unbalanced);
   if (limited) energy = energies_of(model_, scene_, state_, memory_.bones).total();
-  if (closed) energy += memory_.found->start_energy();
+  if (closed) energy += memory_.found->start_energy(*memory_.held);
   state_.q_previous = state_.q;
   state_.v_previous = state_.v;
   state_.v = workspace_.rate;
@@ -793,8 +796,12 @@ const FullReport& FullStep::finish(const FrameMomenta& others) noexcept {
   if (near_) model_.contacts->commit(workspace_.trial.data(), *memory_.found, *memory_.held);
   if (model_.rigid) model_.rigid->place(workspace_.trial.data(), workspace_.potential.rigid);
   if (model_.rigid && !unbalanced && !is_attached()) correct_momenta(others);
-  if (limited)
-    limit_energy(energy, closed ? memory_.found->end_energy(Eigen::Vector3d::Zero()) : 0, unbalanced ? 0 : kGain);
+  const double springs = near_ ? memory_.found->end_energy(Eigen::Vector3d::Zero()) : 0;
+  if (memory_.held != nullptr) memory_.held->account = springs;
+  if (limited) {
+    const double beside = limit_energy(energy, closed ? springs : 0, unbalanced ? 0 : kGain);
+    if (closed) memory_.held->account = std::min(springs, energy - beside);
+  }
   if (!state_.v.allFinite()) report_.status |= kStepNonFinite;  // by what momenta and energies make of it
   end_attachments();
   if (model_.skin) end_bones();

@@ -222,7 +222,7 @@ class FullStep {
   bool is_free() const noexcept { return model_.rigid && !is_attached(); }
   void move_centre(const Eigen::Vector3d& velocity) noexcept;
   bool is_closed() const noexcept;
-  void limit_energy(double allowed, double springs, double gain) noexcept;
+  double limit_energy(double allowed, double springs, double gain) noexcept;
 
   const FullModel& model_;
   const FullSpace& space_;

@@ -94,7 +94,9 @@ void expect_derivatives(Potential& of, double curved = 1) {
   constexpr double h = 1e-5;
   const auto slope_of = [&](const auto& f) {
     using Value = decltype(f(of.d));
-    const auto about = [&](double step) { return Value(f(of.d + step * of.direction) - f(of.d - step * of.direction)); };
+    const auto about = [&](double step) {
+      return Value(f(of.d + step * of.direction) - f(of.d - step * of.direction));
+    };
     return Value((8 * about(h) - about(2 * h)) / (12 * h));
   };
   const Eigen::VectorXd product = of.product(of.direction), gradient = of.gradient(of.d);
