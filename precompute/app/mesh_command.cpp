@@ -45,6 +45,7 @@ void mesh_command(const MeshCommandOptions& options) {
   precompute::log_notes(surface, options.surface);
   precompute::warn_of_flat_body(surface.mesh, options.surface);
   const precompute::Cage cage = precompute::make_cage(surface.mesh, options.settings, options.surface);
+  precompute::warn_of_thin_surface(surface.mesh, cage, options.surface);
   precompute::write_msh(cage.mesh, options.mesh);
   print_cage(options, surface, cage);
 }

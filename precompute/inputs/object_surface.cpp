@@ -48,6 +48,7 @@ ObjectSurface::ObjectSurface(const AssetConfig& asset, InputFiles& files, StageC
       embedding_(embed_points(cage_.mesh, file_.mesh.vertices, asset.object_surface->string())),
       tree_(file_.mesh.vertices, file_.mesh.triangles) {
   warn_of_flat_body(file_.mesh, *asset.object_surface);
+  warn_of_thin_surface(file_.mesh, cage_, asset.object_surface->string());
 }
 
 VertexMarks ObjectSurface::marks_at(const VertexArray& points) const {

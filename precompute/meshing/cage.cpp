@@ -46,6 +46,10 @@ constexpr int kCountRounds = 4;
 constexpr double kUsualPower = 2.5;
 // Vertices of the surface are no farther out of the cage, over the cell size.
 constexpr double kOutside = 0.75;
+// A cage with more of the surface's volume stands off.
+constexpr double kStandingOffVolume = 1.15;
+// Tets of a sheet in a cube of its thickness, small enough that they follow it.
+constexpr double kCellsOfACube = 8.5;
 // A number of tets is met by so much.
 constexpr double kCountTolerance = 0.1;
 // Cell sizes over the diagonal that are tried at most: one cell for all, ten million.
@@ -312,6 +316,28 @@ Cage make_cage(const SurfaceMesh& surface, const CageSettings& settings, const s
       cage.mesh.tet_count(), cage.mesh.vertex_count(), cage.cell_size, cage.least_angle, cage.largest_angle,
       cage.volume_ratio ? fmt::format(", {:.2f} times the surface's volume", *cage.volume_ratio) : ""));
   return cage;
+}
+
+std::optional<Eigen::Index> cells_that_follow(const SurfaceMesh& surface, const Cage& cage) {
+  if (!cage.volume_ratio || *cage.volume_ratio <= kStandingOffVolume) return std::nullopt;
+  double area = 0;
+  for (const auto& corners : surface.triangles.rowwise()) {
+    const Eigen::RowVector3d a = surface.vertices.row(corners[0]);
+    const Eigen::RowVector3d ab = surface.vertices.row(corners[1]) - a, ac = surface.vertices.row(corners[2]) - a;
+    area += 0.5 * ab.cross(ac).norm();
+  }
+  const double volume = cage.volume / *cage.volume_ratio, thickness = 2 * volume / area;
+  const double cells = kCellsOfACube * volume / std::pow(thickness, 3);
+  return std::max(static_cast<Eigen::Index>(std::lround(cells)), 2 * cage.mesh.tet_count());
+}
+
+void warn_of_thin_surface(const SurfaceMesh& surface, const Cage& cage, const std::string& name) {
+  const auto cells = cells_that_follow(surface, cage);
+  if (!cells) return;
+  log::warning(fmt::format(
+      "{}: the body has {:.2f} times the volume of its surface, which is thinner than cells of {:.3g} m: it "
+      "is too heavy and too stiff; about {} cells (object.cells) follow it",
+      name, *cage.volume_ratio, cage.cell_size, *cells));
 }
 
 std::string mesher_version() { return mesher_module().version; }

@@ -46,6 +46,13 @@ constexpr double kLeastDihedralAngle = 10;
 /// cage.
 Cage make_cage(const SurfaceMesh& surface, const CageSettings& settings, const std::string& name);
 
+/// About how many cells follow a closed surface that is thinner than those of its cage, which then stands off and has
+/// more than 1.15 times the surface's volume; none where it has not.
+std::optional<Eigen::Index> cells_that_follow(const SurfaceMesh& surface, const Cage& cage);
+
+/// Warns of such a surface; `name` is for the message.
+void warn_of_thin_surface(const SurfaceMesh& surface, const Cage& cage, const std::string& name);
+
 /// "CGAL 5.5.1", or "none" where the module with the mesher is not there.
 std::string mesher_version();
 

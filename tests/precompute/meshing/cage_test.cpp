@@ -191,6 +191,20 @@ TEST(Cage, StandsOffASheetThinnerThanACell) {
 
 // Two ends that a rod of a hundredth of their thickness joins: rays from the middle meet the rod alone or an end, and a
 // cage that follows the rod closely falls apart.
+// A plate and a rod that are thinner than a cell; as many cells as are advised follow them.
+TEST(Cage, SaysHowManyCellsFollowAThinSurface) {
+  for (const Eigen::Vector3d& lengths : {Eigen::Vector3d(1, 1, 0.05), Eigen::Vector3d(1, 0.04, 0.04)}) {
+    const SurfaceMesh thin = box_surface({10, 4, 2}, {lengths[0], lengths[1], lengths[2]});
+    const Cage coarse = make_cage(thin, {.cells = 400}, "thin");
+    EXPECT_GT(*coarse.volume_ratio, 1.2);
+    const auto cells = cells_that_follow(thin, coarse);
+    ASSERT_TRUE(cells);
+    const Cage fine = make_cage(thin, {.cells = static_cast<int>(*cells)}, "thin");
+    EXPECT_LE(*fine.volume_ratio, 1.15) << *cells << " cells";
+    EXPECT_FALSE(cells_that_follow(thin, fine));
+  }
+}
+
 TEST(Cage, OfWhatHangsTogetherIsOneBody) {
   SurfaceMesh surface = box_surface({32, 4, 4}, {4, 1, 1});
   for (auto point : surface.vertices.rowwise()) {

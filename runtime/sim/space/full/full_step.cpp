@@ -723,8 +723,7 @@ void FullStep::move_centre(const Eigen::Vector3d& velocity) noexcept {
 
 // True if nothing but gravity and obstacles that stand still, which it touches, changes the energy of the body.
 bool FullStep::is_closed() const noexcept {
-  return memory_.found->loaded_count > 0 && state_.applied_force.isZero(0) &&
-         is_isolated(scene_, *memory_.found);
+  return memory_.found->loaded_count > 0 && state_.applied_force.isZero(0) && is_isolated(scene_, *memory_.found);
 }
 
 // A solution that did not converge may hold contact forces that throw the body, and springs of vertices that a step has
