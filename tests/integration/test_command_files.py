@@ -250,9 +250,14 @@ class Commands(unittest.TestCase):
                 self.refused(*words, said=[words[-2], "a file, or the name of a new one"])
 
     def test_options_that_no_solver_takes_are_said(self):
-        for option, value in (("--eps-max_it", "0"), ("--eps-tol", "nan"), ("--eps-tol", "1"), ("--eps-ncv", "1"), ("--st-type", "foo"), ("--eps-nev", "x")):
+        for option, value in (("--eps-max_it", "0"), ("--eps-tol", "nan"), ("--eps-ncv", "1"), ("--st-type", "foo"), ("--eps-nev", "x")):
             self.refused("bundle", "asset.json", "-o", "new.h5", option, value,
                          said=[f"command line: {option.replace('_', '-')} {value}: expected options by which", "mend their values"], unsaid=["PETSc", "http"])
+        # Eigenpairs that are found, but not exact.
+        asset = json.loads((self.folder / "asset.json").read_text())
+        asset["object"].pop("fixed")
+        write_json(self.folder / "free.json", {**asset, "basis": {"size": 15, "training": "none"}})
+        self.refused("bundle", "free.json", "-o", "new.h5", "--eps-tol", "1", said=["command line: --eps-tol 1: expected options by which"], unsaid=["16 digits"])
         for kind in ("lapack", "foo", "ciss"):
             self.refused("bundle", "asset.json", "-o", "new.h5", "--eps-type", kind, said=["--eps-type: expected one of krylovschur", f"'{kind}'"])
 
