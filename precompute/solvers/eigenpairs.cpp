@@ -199,6 +199,20 @@ double share_of_mass(const SparseMatrix& stiffness, const SparseMatrix& mass, co
   return size < 1 && size > 0 ? std::exp2(std::floor(std::log2(size))) : 1;
 }
 
+// Where work() fails by a Fault while options are given, the complaint is about them.
+template <class Fault, class Work>
+auto under_options(const Work& work) {
+  try {
+    return work();
+  } catch (const Fault& fault) {
+    if (solver_settings().options.empty()) throw;
+    log::debug(fault.what());
+    throw InputError({"command line", words_of_options(), "options by which the eigenpairs are found",
+                      "values that the eigensolver refuses or fails with",
+                      "mend their values, or leave them out; --log-level debug says why"});
+  }
+}
+
 // The eigenproblem, on all ranks while it lives unless the leader has the factors.
 class TeamProblem {
  public:
@@ -221,9 +235,11 @@ class TeamProblem {
     fields.leftCols(found.cols()) = found;
     fields.rightCols(1) = solver_.solve(start_vector(solver_.size(), 1 + static_cast<unsigned>(found.cols())));
     announce({Task::kSearch, share_->id, {found.cols(), count}});
-    Eigen::MatrixXd vectors = share_->search(fields, found.cols(), count);
-    require_options_taken();
-    return vectors;
+    return under_options<WorkError>([&] {
+      Eigen::MatrixXd vectors = share_->search(fields, found.cols(), count);
+      require_options_taken();
+      return vectors;
+    });
   }
 
  private:
@@ -351,15 +367,7 @@ Eigen::MatrixXd EigenShare::search(const Eigen::MatrixXd& fields, Eigen::Index f
 Eigenpairs smallest_eigenpairs(const SparseMatrix& stiffness, const SparseMatrix& mass,
                                const SemidefiniteSolver& solver, Eigen::Index count) {
   if (2 * (count + solver.share().border) >= solver.size()) return dense_eigenpairs(stiffness, mass, solver, count);
-  try {
-    return search_eigenpairs(stiffness, mass, solver, count);
-  } catch (const WorkError& error) {
-    if (solver_settings().options.empty()) throw;
-    log::debug(error.what());
-    throw InputError({"command line", words_of_options(), "options by which the eigenpairs are found",
-                      "values that the eigensolver refuses or fails with",
-                      "mend their values, or leave them out; --log-level debug says why"});
-  }
+  return under_options<IllConditioned>([&] { return search_eigenpairs(stiffness, mass, solver, count); });
 }
 
 void fix_signs(Eigen::MatrixXd& columns) {

@@ -75,8 +75,8 @@ void attach(std::span<const std::int64_t> vertices, const exmat_attachment& sett
   Attachment attachment = attachment_of(settings, body);
   set_frame(frame, attachment);
   const std::vector<std::int32_t> ids = vertices_of("vertices", vertices, body);
-  if (const auto fault = hold(body.model(), body.full(), body.scene, body.world->world.may_touch(place_of(body)),
-                              read_patch(ids, body), std::move(attachment), body.state))
+  if (const auto fault =
+          hold(body.model(), body.full(), body.scene, read_patch(ids, body), std::move(attachment), body.state))
     throw InvalidArgument(std::string(fault->member) + ": " + fault->found + ": expected " + fault->expected);
   id = body.next_attachment++;
   if (steps_in_modes(body)) body.world->world.fit_attachments(place_of(body));

@@ -151,10 +151,6 @@ void check_joins(const exmat_world& world, const exmat_body& body) {
   if (!body.own) throw InvalidArgument("the body is in a world already");
   if (world.law.apart == 0 && !body.model().contact)
     throw InvalidArgument("the model knows no contact: expected settings with use_contact, or a scene with obstacles");
-  const auto is_hard = [](const Attachment& held) { return held.holds() && held.conditions() > 0; };
-  if (world.law.apart == 0 && std::ranges::any_of(body.state.attachments, is_hard))
-    throw InvalidArgument(
-        "the body steps in its modes and is held other than by springs: expected a world with law.apart = 1");
   if (world.members.empty()) return;
   const double step = world.members.front().body->scene.time_step;
   if (body.scene.time_step != step)

@@ -120,12 +120,9 @@ Patch load_patch(const SceneConfig& config, const ObjectData& object, const Vert
   return make_patch(object, std::move(vertices), std::move(rows));
 }
 
-std::optional<HoldFault> hold(const Model& model, const FullModel* full, const StepScene& scene, bool may_touch,
-                              const Patch& patch, Attachment attachment, State& state) {
+std::optional<HoldFault> hold(const Model& model, const FullModel* full, const StepScene& scene, const Patch& patch,
+                              Attachment attachment, State& state) {
   const bool in_modes = steps_in_modes(full, scene);
-  if (in_modes && may_touch && attachment.kind != AttachmentKind::kSpring)
-    return HoldFault{"kind", "spring, or space full or auto: bodies that may touch others are held so in their modes",
-                     std::string(name_of(attachment.kind))};
   double mass = in_modes ? patch.masses.sum() : 0;
   for (std::size_t k = 0; k < patch.vertices.size(); ++k) {
     if (auto fault = fault_of(full, in_modes, patch, k, state)) return fault;
@@ -186,7 +183,6 @@ std::vector<LoadedAttachment> load_attachments(const SceneConfig& config, const 
   const bool in_modes = steps_in_modes(loaded.full.get(), loaded.scene);
   for (const AttachmentConfig& own : config.attachments) {
     LoadedAttachment& made = attachments.emplace_back(LoadedAttachment{config.file.string(), own.place, own.only});
-    made.may_touch = config.meets_bodies;
     made.patch =
         std::make_shared<Patch>(load_patch(config, object, own.vertices, own.place + "/vertices", in_modes, loaded));
     Attachment& attachment = made.attachment;
@@ -220,8 +216,7 @@ void hold_body(const LoadedScene& kind, std::size_t number, State& state) {
     Attachment attachment = own->attachment;
     attachment.id = std::ssize(state.attachments);
     attachment.follow(state.time, state.time);
-    if (const auto fault =
-            hold(*kind.model, kind.full.get(), kind.scene, own->may_touch, *own->patch, std::move(attachment), state))
+    if (const auto fault = hold(*kind.model, kind.full.get(), kind.scene, *own->patch, std::move(attachment), state))
       throw InputError({own->file, fmt::format("{}/{}", own->place, fault->member), fault->expected, fault->found, ""});
   }
 }

@@ -34,10 +34,10 @@ Patch load_patch(const SceneConfig& config, const ObjectData& object, const Vert
                  const std::string& place, bool in_modes, LoadedScene& loaded);
 
 /// Adds an attachment that has id, kind and frame to a body whose vertices it holds from where they are. Enters full
-/// space where bodies are held there. `may_touch`: the body may touch others. What is to blame, and the state is as it
-/// was, but perhaps in full space, where it cannot be held.
-std::optional<HoldFault> hold(const Model& model, const FullModel* full, const StepScene& scene, bool may_touch,
-                              const Patch& patch, Attachment attachment, State& state);
+/// space where bodies are held there. What is to blame, and the state is as it was, but perhaps in full space, where it
+/// cannot be held.
+std::optional<HoldFault> hold(const Model& model, const FullModel* full, const StepScene& scene, const Patch& patch,
+                              Attachment attachment, State& state);
 
 /// A body at one end of an attachment between two, where it is.
 struct End {

@@ -39,7 +39,6 @@ struct LoadedOtherEnd {
 struct LoadedAttachment {
   std::string file, place;                ///< in the scene
   std::optional<std::size_t> only{};      ///< the one of these bodies; absent: all of them
-  bool may_touch = false;                 ///< they may touch others
   std::shared_ptr<const Patch> patch{};   ///< vertices that it holds
   std::optional<LoadedOtherEnd> other{};  ///< present where a body holds them
   Attachment attachment{};                ///< all but these, and id and frame

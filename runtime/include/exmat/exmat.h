@@ -395,8 +395,7 @@ EXMAT_API exmat_status exmat_attachment_default(exmat_attachment* attachment, si
 /* From the next step on, by where `vertices` [count] of the object are now in the frame. None of them may be fixed, or
    held already. `id` of the attachment is the body's own; those that a scene gives it have the ids 0, 1, ... in the
    scene's order, those to other bodies last, and are there again after a reset. Of a body of space _REDUCED the bundle
-   is read; its modes have to be able to hold the patch, and frames hold a body that may touch others by springs alone.
- */
+   is read; its modes have to be able to hold the patch. */
 EXMAT_API exmat_status exmat_body_attach(exmat_body* body, const int64_t* vertices, int64_t count,
                                          const exmat_attachment* attachment, const double* frame,
                                          int64_t* id) EXMAT_NOEXCEPT;

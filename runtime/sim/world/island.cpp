@@ -84,14 +84,26 @@ void IslandProblem::place(const Eigen::VectorXd& x) noexcept {
   });
 }
 
-/// Hard attachments, and a block of conditions for either body of each.
+/// Calls use(body, its block of conditions) for those that frames hold.
+template <class Use>
+void IslandProblem::for_framed(const Use& use) const {
+  for (std::size_t k = 0; k < workspace_.framed.size(); ++k)
+    use(body(static_cast<std::size_t>(workspace_.framed[k])),
+        workspace_.conditions.blocks[2 * workspace_.hard.size() + k]);
+}
+
+/// Hard attachments, and a block of conditions for either body of each, or for all frames of a body.
 void IslandProblem::collect_hard() {
   workspace_.hard.clear();
   for (PairContact* const pair : pairs_)
     for (PairAttachment& own : pair->attachments())
       if (own.conditions() > 0) workspace_.hard.push_back({pair, &own});
+  workspace_.framed.clear();
+  for (std::size_t i = 0; i < bodies_.size(); ++i)
+    if (!body(i).full && holds_modes(body(i).state.attachments) && body(i).near().held.conditions() > 0)
+      workspace_.framed.push_back(static_cast<int>(i));
   Conditions& conditions = workspace_.conditions;
-  conditions.blocks.resize(2 * workspace_.hard.size());
+  conditions.blocks.resize(2 * workspace_.hard.size() + workspace_.framed.size());
   Eigen::Index count = 0;
   for (std::size_t k = 0; k < workspace_.hard.size(); ++k) {
     const auto& [pair, own] = workspace_.hard[k];
@@ -104,6 +116,12 @@ void IslandProblem::collect_hard() {
     }
     count += own->conditions();
   }
+  for_framed([&](const WorldBody& held, ConditionBlock& block) {
+    block.offset = held.offset;
+    block.first = count;
+    block.directions.setZero(held.unknowns(), held.near().held.conditions());
+    count += held.near().held.conditions();
+  });
   conditions.resize(count);
 }
 
@@ -136,21 +154,32 @@ double IslandProblem::set_conditions(const Eigen::VectorXd& x) noexcept {
       extent = std::max(extent, held.placement.position.norm());
     }
   }
+  for_framed([&](WorldBody& held, ConditionBlock& block) {
+    AttachmentWorkspace& own = held.near().held;
+    const Eigen::VectorXd own_x = x.segment(held.offset, held.unknowns());
+    runtime::set_conditions(held.state.attachments, *held.model.frame, own_x, held.pose(), own);
+    block.gradients = own.gradients();
+    workspace_.conditions.violation.segment(block.first, own.conditions()) = own.violation;
+    extent = std::max(extent, held.placement.position.norm());
+  });
   return extent;
 }
 
 void IslandProblem::set_condition_directions() noexcept {
-  for (std::size_t k = 0; k < workspace_.conditions.blocks.size(); ++k) {
-    const PairContact& pair = *workspace_.hard[k / 2].pair;
-    NewtonWorkspace& factors = body(static_cast<std::size_t>(pair.body(static_cast<int>(k % 2)))).near().newton;
-    ConditionBlock& block = workspace_.conditions.blocks[k];
+  const auto set = [](WorldBody& held, ConditionBlock& block) {
+    NewtonWorkspace& factors = held.near().newton;
     Eigen::Map<Eigen::VectorXd> column(factors.direction.data(), block.gradients.rows());
     for (Eigen::Index i = 0; i < block.gradients.cols(); ++i) {
       column = block.gradients.col(i);
       kernels().cholesky_solve(factors.factor.data(), column.size(), factors.direction.data());
       block.directions.col(i) = column;
     }
+  };
+  for (std::size_t k = 0; k < 2 * workspace_.hard.size(); ++k) {
+    const PairContact& pair = *workspace_.hard[k / 2].pair;
+    set(body(static_cast<std::size_t>(pair.body(static_cast<int>(k % 2)))), workspace_.conditions.blocks[k]);
   }
+  for_framed(set);
   workspace_.conditions.factorise();
 }
 
@@ -178,6 +207,13 @@ double IslandProblem::take_condition_forces(Eigen::VectorXd& gradient) noexcept 
                  gradients.bottomRows(held.state.q.size()).lazyProduct(multipliers).squaredNorm();
     }
   }
+  for_framed([&](WorldBody& held, const ConditionBlock& block) {
+    AttachmentWorkspace& own = held.near().held;
+    own.multipliers = conditions.multipliers.segment(block.first, own.conditions());
+    add_condition_forces(held.state.attachments, held.pose(), own);
+    squares += std::pow(held.model.frame->residual_of(own.sums.force), 2) +
+               block.gradients.bottomRows(held.state.q.size()).lazyProduct(own.multipliers).squaredNorm();
+  });
   return std::sqrt(squares);
 }
 
@@ -695,13 +731,25 @@ void end_accounts(std::span<WorldBody* const> bodies, std::span<PairContact* con
     for (PairContact* const pair : pairs) pair->scale_account(most / sum);
 }
 
+/// Number of the first attachment by which a frame holds a body hard.
+Eigen::Index first_hard(std::span<const Attachment> attachments) noexcept {
+  return std::ranges::find_if(attachments, [](const Attachment& own) { return own.holds() && own.conditions() > 0; }) -
+         attachments.begin();
+}
+
 /// The centre of mass goes exactly as the momentum, and the momentum as the forces have it, so that what the residual
 /// of Newton's method leaves of force would leave hard attachments open: their forces f become such that they close,
 /// and stay equal and opposite. Of the centres alone, x of attachment k moves against y by sum_j W_kj f_j, W of the
-/// masses.
+/// masses. Of the frames that hold a body the first one has it all.
 void settle(std::span<WorldBody* const> bodies, IslandWorkspace& workspace) noexcept {
-  const auto count = std::ssize(workspace.hard);
+  const auto pairs = std::ssize(workspace.hard), count = pairs + std::ssize(workspace.framed);
   if (count == 0) return;
+  /// Body and sign of either end of an attachment; a frame has no body.
+  const auto end_of = [&](Eigen::Index k, int side) {
+    if (k >= pairs) return std::pair(side == 0 ? workspace.framed[static_cast<std::size_t>(k - pairs)] : -1, 1.0);
+    const HardAttachment& own = workspace.hard[static_cast<std::size_t>(k)];
+    return std::pair(own.pair->body(side), own.attachment->sign(side));
+  };
   const auto mobility_of = [&](int number) {
     const WorldBody& own = *bodies[static_cast<std::size_t>(number)];
     const double dt = own.scene().time_step;
@@ -710,26 +758,32 @@ void settle(std::span<WorldBody* const> bodies, IslandWorkspace& workspace) noex
   Eigen::MatrixXd& W = workspace.mobility;
   W.setZero(count, count + 3);  // and how far each is open
   for (Eigen::Index k = 0; k < count; ++k) {
-    const HardAttachment& own = workspace.hard[static_cast<std::size_t>(k)];
     for (const int side : {0, 1}) {
-      const int number = own.pair->body(side);
-      const WorldBody& held = *bodies[static_cast<std::size_t>(number)];
-      const double mobility = mobility_of(number), sign = own.attachment->sign(side);
+      const auto [number, sign] = end_of(k, side);
+      const double mobility = number < 0 ? 0 : mobility_of(number);
       if (mobility == 0) continue;
+      const WorldBody& held = *bodies[static_cast<std::size_t>(number)];
       const Eigen::Vector3d lacking = held.model.frame->force_of(held.near().x, held.workspace.frame) -
                                       held.near().contact.force - held.near().held.sums.force;
       W.row(k).tail<3>() += sign * mobility * lacking.transpose();
-      for (Eigen::Index j = 0; j < count; ++j) {
-        const HardAttachment& other = workspace.hard[static_cast<std::size_t>(j)];
+      for (Eigen::Index j = 0; j < count; ++j)
         for (const int its : {0, 1})
-          if (other.pair->body(its) == number) W(k, j) += sign * other.attachment->sign(its) * mobility;
-      }
+          if (const auto [other, its_sign] = end_of(j, its); other == number) W(k, j) += sign * its_sign * mobility;
     }
     W(k, k) = W(k, k) > 0 ? W(k, k) * (1 + kRedundant) : 1;
   }
   workspace.mobility_factor.compute(W.leftCols(count));
   const Eigen::MatrixXd forces = workspace.mobility_factor.solve(W.rightCols<3>());
-  for (Eigen::Index k = 0; k < count; ++k) {
+  for (Eigen::Index k = pairs; k < count; ++k) {
+    WorldBody& held = *bodies[static_cast<std::size_t>(workspace.framed[static_cast<std::size_t>(k - pairs)])];
+    const Eigen::Index first = first_hard(held.state.attachments);
+    const Attachment& own = held.state.attachments[static_cast<std::size_t>(first)];
+    const Eigen::Vector3d force = forces.row(k), arm = mean_of(own, held.pose()) - held.placement.position;
+    held.near().held.forces.col(first) += force;
+    held.near().held.sums.force += force;
+    held.near().held.sums.torque += arm.cross(force);
+  }
+  for (Eigen::Index k = 0; k < pairs; ++k) {
     const HardAttachment& own = workspace.hard[static_cast<std::size_t>(k)];
     const auto sums = [&](int side) -> ContactSums& {
       return bodies[static_cast<std::size_t>(own.pair->body(side))]->near().held.sums;

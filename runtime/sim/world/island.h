@@ -50,7 +50,8 @@ struct IslandWorkspace {
   AlignedArray factor, right_side;
   Eigen::VectorXd residual, preconditioned, direction, product;
 
-  std::vector<HardAttachment> hard;  ///< those whose conditions follow, in their order
+  std::vector<HardAttachment> hard;  ///< those whose conditions follow, in their order, two blocks for each
+  std::vector<int> framed;           ///< bodies that frames hold by conditions, which follow these, a block for each
   Conditions conditions;
   Eigen::MatrixXd mobility;  ///< one for each: see settle()
   Eigen::PartialPivLU<Eigen::MatrixXd> mobility_factor;
@@ -65,8 +66,9 @@ struct Incidence {
 /// Bodies that touch in a step and the contacts between them: what one step of all of them minimises, the sum of their
 /// own potentials and that of the contacts, in the unknowns of all. For newton_minimise. Small islands are factorised;
 /// larger ones, and those with bodies in full space, solve by conjugate gradients, preconditioned by the factors of the
-/// bodies' own Hessians or what stands for them. Hard attachments between bodies are Conditions, whose A are the
-/// bodies' own Hessians. Sums are taken in the order of bodies and pairs, whatever the number of threads.
+/// bodies' own Hessians or what stands for them. Hard attachments of bodies to each other and to frames are Conditions,
+/// whose A are the bodies' own Hessians. Sums are taken in the order of bodies and pairs, whatever the number of
+/// threads.
 class IslandProblem {
  public:
   static constexpr bool kSeeksLowest = true;
@@ -75,7 +77,8 @@ class IslandProblem {
   IslandProblem(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
                 std::span<const std::vector<Incidence>> incidences, int threads, IslandWorkspace& workspace);
 
-  bool has_hard() const noexcept { return !workspace_.hard.empty(); }  ///< attachments between its bodies
+  /// True if attachments hold some of its bodies by conditions.
+  bool has_hard() const noexcept { return workspace_.conditions.conditions() > 0; }
 
   /// With hard attachments: the Hessian at the first iterate `x`, factorised, and x where they hold. False where
   /// nothing leads there.
@@ -104,6 +107,8 @@ class IslandProblem {
   const WorldBody& second(const PairContact& pair) const noexcept;
   void place(const Eigen::VectorXd& x) noexcept;
   void collect_hard();
+  template <class Use>
+  void for_framed(const Use& use) const;
   double set_conditions(const Eigen::VectorXd& x) noexcept;
   void set_condition_directions() noexcept;
   bool hold(Eigen::VectorXd& x) noexcept;

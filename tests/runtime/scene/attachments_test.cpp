@@ -261,23 +261,18 @@ TEST_F(ScenesOfAttachedBodies, ThatCannotBeAreRefusedWithTheirPlace) {
               HasSubstr("/attachments/0/to: expected two bodies of space reduced"));
 }
 
-// In their modes islands take springs of frames alone.
-TEST_F(SceneAttachments, OfBodiesThatMayTouchAreSprings) {
-  const auto refusal = [&](const std::string& members) -> std::string {
+// In their modes, too, whatever their kind.
+TEST_F(SceneAttachments, OfBodiesThatMayTouchHold) {
+  for (const char* const kind : {"fixed", "ball", "spring"}) {
     test::write_file(folder_ / "world.json", R"({"bodies": [
       {"name": "bar", "bundle": "bar.h5", "grid": {"counts": [1, 1, 2], "spacing": [0, 0, 2]}}], "attachments": [{)" +
-                                                 std::string(kEnd) + R"(, "body": "bar_1")" + members + "}]}");
-    try {
-      const WorldConfig config = load_world(folder_ / "world.json");
-      const LoadedWorld loaded = load_world_run(config);
-      const Bodies bodies(loaded, config);
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "none";
-  };
-  EXPECT_THAT(refusal(""), HasSubstr("/attachments/0/kind: expected spring, or space full or auto"));
-  EXPECT_EQ(refusal(R"(, "kind": "spring")"), "none");
+                                                 std::string(kEnd) + R"(, "body": "bar_1", "kind": ")" + kind +
+                                                 "\"}]}");
+    const WorldConfig config = load_world(folder_ / "world.json");
+    const LoadedWorld loaded = load_world_run(config);
+    const Bodies bodies(loaded, config);
+    EXPECT_EQ(bodies.world().state(1).attachments.size(), 1U) << kind;
+  }
 }
 
 }  // namespace

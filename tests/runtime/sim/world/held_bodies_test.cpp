@@ -1,4 +1,6 @@
+#include <cmath>
 #include <gtest/gtest.h>
+#include <optional>
 
 #include "tests/runtime/sim/world/held_vertex.h"
 #include "tests/runtime/sim/world/touching_blocks.h"
@@ -62,6 +64,91 @@ TEST(HeldBody, ThatLiesOnAnotherPullsAtItsSpring) {
   }
   EXPECT_EQ(together, 100);
   EXPECT_GE(upper.attachments[0].force.norm(), 1);
+}
+
+/// A block whose lower corners a frame holds, below another one.
+struct HeldBelow {
+  explicit HeldBelow(AttachmentKind kind, double gap = 0) : blocks(0.002) {
+    blocks.set_gravity(9.81);
+    blocks.scene.newton.tolerance = 1e-10;
+    world.emplace(std::vector{blocks.body(Eigen::Vector3d(0, 0, 0)), blocks.body(Eigen::Vector3d(0, 0, 0.2 + gap))},
+                  ContactLaw{.stiffness = 1e7, .damping = 100, .friction = 0.3});
+    hold(*world, kind);
+  }
+  void hold(World& of, AttachmentKind kind) const {
+    std::vector<Eigen::Index> corners;
+    const VertexArray& rest = blocks.bar.model.object->mesh.vertices;
+    for (Eigen::Index v = 0; v < rest.rows(); ++v)
+      if (rest(v, 2) == 0 && (rest(v, 0) == 0 || rest(v, 0) == 0.4) && rest(v, 1) != 0.1) corners.push_back(v);
+    of.state(0).attachments.push_back(test::held_patch(*blocks.model, blocks.bar, of.state(0), corners, kind));
+    of.fit_attachments(0);
+  }
+  const Attachment& held() const { return world->state(0).attachments[0]; }
+
+  test::Blocks blocks;
+  std::optional<World> world;
+};
+
+// The frame is shaken at 10 m/s and turned at up to 20 rad/s; backward Euler's change of the momentum of both is by the
+// force on the frame and their weights.
+TEST(HeldBody, ThatAnotherLiesOnGoesWithItsFrame) {
+  for (const AttachmentKind kind : {AttachmentKind::kFixed, AttachmentKind::kBall})
+    for (const bool is_moved : {false, true}) {
+      SCOPED_TRACE(testing::Message() << "kind " << static_cast<int>(kind) << ", moved " << is_moved);
+      HeldBelow bodies(kind);
+      World& world = *bodies.world;
+      const Eigen::Vector3d weight = 2 * bodies.blocks.mass() * bodies.blocks.scene.gravity;
+      int together = 0;
+      for (int i = 1; i <= 100; ++i) {
+        const double t = is_moved ? i * bodies.blocks.scene.time_step : 0;
+        Attachment& held = world.state(0).attachments[0];
+        held.position = {0.05 * std::sin(200 * t), 0, 0.02 * t};
+        held.rotation = Eigen::AngleAxisd(0.1 * std::sin(200 * t), Eigen::Vector3d(1, 2, 3).normalized());
+        const Eigen::Vector3d before = test::momenta(bodies.blocks, world).linear;
+        together += world.step(1).touching_pairs;
+        ASSERT_EQ(world.report(0).status | world.report(1).status, 0U) << i;
+        const BodyPose pose = pose_of(*bodies.blocks.model, world.state(0));
+        EXPECT_LE((mean_of(held, pose) - held.anchor()).norm(), 1e-10 * 0.4) << i;
+        if (kind == AttachmentKind::kFixed) {
+          PatchPlace place;
+          place_patch(held.patch, pose, place);
+          EXPECT_LE((place.rotation - held.rotation).norm(), 1e-9) << i;
+        }
+        const Eigen::Vector3d rate =
+            (test::momenta(bodies.blocks, world).linear - before) / bodies.blocks.scene.time_step;
+        EXPECT_LE((rate - weight + held.force).norm(), 1e-9 * (weight.norm() + held.force.norm())) << i;
+      }
+      EXPECT_GE(together, is_moved ? 1 : 100);
+      if (!is_moved && kind == AttachmentKind::kFixed)  // it has come to rest
+        EXPECT_LE((bodies.held().force - weight).norm(), 0.05 * weight.norm());
+    }
+}
+
+// Beside a body that does not touch it, in one island, as by itself.
+TEST(HeldBody, StepsBesideAnotherAsAlone) {
+  HeldBelow bodies(AttachmentKind::kFixed, 1e-3);
+  bodies.blocks.set_gravity(0);
+  World alone({bodies.blocks.body(Eigen::Vector3d(0, 0, 0))}, {.stiffness = 1e7});
+  bodies.hold(alone, AttachmentKind::kFixed);
+  bodies.blocks.scene.integrator = Integrator::kBackwardEuler;
+  for (int i = 1; i <= 20; ++i) {
+    for (World* const world : {&*bodies.world, &alone})
+      world->state(0).attachments[0].position[0] = 0.01 * std::sin(0.1 * i);
+    EXPECT_EQ(bodies.world->step(1).touching_pairs, 0);
+    alone.step(1);
+    const Eigen::VectorXd& q = alone.state(0).q;
+    EXPECT_LE((bodies.world->state(0).q - q).norm(), 1e-9 * q.norm()) << i;
+  }
+}
+
+// A load of 1 N is more than the frame bears.
+TEST(HeldBody, ThatAnotherLiesOnBreaksOff) {
+  HeldBelow bodies(AttachmentKind::kFixed);
+  bodies.world->state(0).attachments[0].break_force = 1;
+  for (int i = 0; i < 50; ++i) bodies.world->step(1);
+  EXPECT_TRUE(bodies.held().broken);
+  EXPECT_EQ(bodies.held().force, Eigen::Vector3d::Zero());
+  EXPECT_LE(bodies.blocks.centre(bodies.world->state(0))[2], 0.1 - 0.5 * 9.81 * 0.08 * 0.08);
 }
 
 }  // namespace held_bodies_test
