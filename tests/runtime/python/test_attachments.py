@@ -63,10 +63,6 @@ def test_modes_alone_hold_what_hangs(free_bundle):
     force, torque, broken = body.attachment_load(held)
     assert not broken and abs(force[2] + 10 * MASS) < 1e-3 * 10 * MASS
     assert np.linalg.norm(torque) > 10 * MASS  # it sticks out by more than 1 m
-    touching = exmat.Body(exmat.Model(free_bundle, use_contact=True))
-    touching.attach(vertices, frame_at([0, 0, 0]))
-    with pytest.raises(exmat.InvalidArgument, match="apart"):
-        exmat.World().add(touching)
     body.detach(held)
     body.step()
     assert np.abs(body.motion.linear_velocity[2] + 0.04) < 1e-3
@@ -81,11 +77,33 @@ def test_modes_alone_refuse_what_they_cannot_hold(bundle, free_bundle):
     with pytest.raises(exmat.InvalidArgument, match="cannot hold"):
         for vertex in range(50):
             free.attach([vertex], frame_at([0, 0, 0]))
-    free = exmat.Body(exmat.Model(free_bundle, use_contact=True))
-    world = exmat.World()
-    world.add(free)
-    with pytest.raises(exmat.InvalidArgument, match="spring"):
-        free.attach([60], frame_at([0, 0, 0]), kind="ball")
+
+
+@pytest.mark.parametrize("joins_first", [False, True])
+def test_what_another_body_lies_on_goes_with_its_frame(free_bundle, joins_first):
+    """Both step in their modes, in one island."""
+    model = exmat.Model(free_bundle, time_step=0.002, use_contact=True, gravity=(0, 0, -10), stiffness_damping=0.01)
+    world = exmat.World(stiffness=1e6, damping=1e3)
+    below, above = exmat.Body(model), exmat.Body(model)
+    if joins_first:
+        world.add(below)
+    corner = exmat.Points(model, [0])
+    start = below.positions(corner, np.empty((1, 3)))[0]
+    held = below.attach([0], frame_at([0, 0, 0]), kind="ball")
+    if not joins_first:
+        world.add(below)
+    xyz = below.positions(exmat.Points.all_vertices(model))
+    above.motion = exmat.Motion(position=(0, 0, np.ptp(xyz[:, 2])))
+    world.add(above)
+    touched = 0
+    for k in range(1, 60):
+        below.move_attachment(held, frame_at([0, 0.004 * k, 0.002 * k]))
+        world.step(1)
+        touched += len(world.contacts) > 0
+        now = below.positions(corner, np.empty((1, 3)))[0]
+        assert np.abs(now - start - [0, 0.004 * k, 0.002 * k]).max() < 1e-10 * np.ptp(xyz)
+        assert below.space == "reduced"
+    assert touched > 5
 
 
 def test_impulses_change_momenta(free_bundle):
