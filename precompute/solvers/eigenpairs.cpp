@@ -199,7 +199,7 @@ double share_of_mass(const SparseMatrix& stiffness, const SparseMatrix& mass, co
   return size < 1 && size > 0 ? std::exp2(std::floor(std::log2(size))) : 1;
 }
 
-// Where work() fails by a Fault while options are given, the complaint is about them.
+// Calls work(). A Fault of it is one of the options, if some are given.
 template <class Fault, class Work>
 auto under_options(const Work& work) {
   try {
@@ -322,7 +322,7 @@ Eigenpairs dense_eigenpairs(const SparseMatrix& stiffness, const SparseMatrix& m
   return std::move(polished.pairs);
 }
 
-/// By searches: more than one, since one may miss an eigenpair.
+/// Searches more than once, since one search may miss an eigenpair.
 Eigenpairs search_eigenpairs(const SparseMatrix& stiffness, const SparseMatrix& mass, const SemidefiniteSolver& solver,
                              Eigen::Index count) {
   const TeamProblem problem(stiffness, mass, solver);

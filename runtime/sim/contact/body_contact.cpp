@@ -360,31 +360,29 @@ bool overlap(const std::vector<HeldBodyContact>& held) noexcept {
 std::optional<Eigen::Vector3d> way_out_of(const TouchingBody& a, const TouchingBody& b,
                                           const std::optional<Eigen::Vector3d>& kept) {
   struct Extent {
-    double least = std::numeric_limits<double>::infinity(), most = -least;
+    Eigen::Array4d least = Eigen::Array4d::Constant(std::numeric_limits<double>::infinity()), most = -least;
   };
-  const auto extent_of = [&](const TouchingBody& body, const Eigen::Vector3d& axis) {
+  Eigen::Matrix<double, 4, 3> ways = Eigen::Matrix<double, 4, 3>::Zero();  // the axes of a, and the one that serves
+  ways.topRows<3>() = a.pose.rotation.transpose();
+  if (kept) ways.row(3) = kept->transpose();
+  const auto extent_of = [&](const TouchingBody& body) {
     Extent extent;
     for (int vertex = 0; vertex < body.set.vertices(); ++vertex) {
       const Eigen::Vector3d place = body.pose.position + body.set.world_arm(vertex, body.pose) - a.pose.position;
-      extent.least = std::min(extent.least, axis.dot(place));
-      extent.most = std::max(extent.most, axis.dot(place));
+      const Eigen::Array4d own = (ways * place).array();
+      extent.least = extent.least.min(own);
+      extent.most = extent.most.max(own);
     }
     return extent;
   };
-  double shortest = std::numeric_limits<double>::infinity();
-  Eigen::Vector3d out;
-  bool deep = false;
-  for (int i = 0; i < 3; ++i) {
-    const Eigen::Vector3d axis = a.pose.rotation.col(i);
-    const Extent own = extent_of(a, axis), other = extent_of(b, axis);
-    const double up = other.most - own.least, down = own.most - other.least, way = std::min(up, down);
-    if (!(way < shortest)) continue;
-    shortest = way;
-    out = up <= down ? axis : Eigen::Vector3d(-axis);
-    deep = way > kDeepStart * std::min(own.most - own.least, other.most - other.least);
-  }
-  if (!kept) return deep ? std::optional(out) : std::nullopt;
-  return extent_of(b, *kept).most - extent_of(a, *kept).least > kMuchFarther * shortest ? out : kept;
+  const Extent own = extent_of(a), other = extent_of(b);
+  const Eigen::Array4d up = other.most - own.least, down = own.most - other.least;  // ways out
+  Eigen::Index axis = 0;
+  const double shortest = up.min(down).head<3>().minCoeff(&axis);
+  if (kept && up[3] <= kMuchFarther * shortest) return kept;
+  if (!kept && !(shortest > kDeepStart * (own.most - own.least).min(other.most - other.least)[axis]))
+    return std::nullopt;
+  return (up[axis] <= down[axis] ? 1 : -1) * a.pose.rotation.col(axis);
 }
 
 void BodyContact::gather(const TouchingBody& a, const TouchingBody& b, const CandidateSearch& search,

@@ -123,8 +123,8 @@ class BodySurface {
   std::optional<SurfaceHit> nearest_looking(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
                                             const Eigen::Vector3d& way) const noexcept;
 
-  /// Where the ray from a point inside leaves the surface first, along a unit vector `way`, which is the normal of what
-  /// is found; at most `most` [m] away. Nothing where it grazes the surface.
+  /// The point by which the ray from a point inside, along a unit vector `way`, leaves the surface first, at most
+  /// `most` [m] away; its normal is `way`. Nothing where the ray grazes the surface.
   std::optional<SurfaceHit> exit(const Eigen::Vector3d& point, const Eigen::Vector3d& way, double most,
                                  SurfaceShape& shape) const noexcept;
 

@@ -92,22 +92,29 @@ void AttachedProblem::solve(Eigen::Map<Eigen::VectorXd>& x) noexcept {
 
 namespace {
 
+bool is_hard(const Attachment& attachment) noexcept { return attachment.holds() && attachment.conditions() > 0; }
+
 /// The centre of mass goes exactly as the conditions have it, and the momentum with it: the residual of Newton's method
 /// in its force goes to the first attachment that is hard.
 void settle_force(const BodyFrame& frame, std::span<const Attachment> attachments, const BodyPose& pose,
                   const FrameWorkspace& workspace, ContactProblemWorkspace& near) noexcept {
   if (frame.rigid_unknowns() == 0) return;
   const Eigen::Vector3d lacking = frame.force_of(near.x, workspace) - near.contact.force - near.held.sums.force;
-  for (std::size_t i = 0; i < attachments.size(); ++i) {
-    if (attachments[i].conditions() == 0 || !attachments[i].holds()) continue;
-    near.held.forces.col(static_cast<Eigen::Index>(i)) += lacking;
-    near.held.sums.force += lacking;
-    near.held.sums.torque += (mean_of(attachments[i], pose) - pose.position).cross(lacking);
-    return;
-  }
+  add_hard_force(attachments, pose, lacking, near.held);
 }
 
 }  // namespace
+
+bool holds_hard(std::span<const Attachment> attachments) noexcept { return std::ranges::any_of(attachments, is_hard); }
+
+void add_hard_force(std::span<const Attachment> attachments, const BodyPose& pose, const Eigen::Vector3d& force,
+                    AttachmentWorkspace& workspace) noexcept {
+  const auto first = std::ranges::find_if(attachments, is_hard);
+  if (first == attachments.end()) return;
+  workspace.forces.col(first - attachments.begin()) += force;
+  workspace.sums.force += force;
+  workspace.sums.torque += (mean_of(*first, pose) - pose.position).cross(force);
+}
 
 NewtonReport solve_attached(const Model& model, const StepScene& scene, const State& state,
                             IncrementalPotential& potential, Workspace& workspace) noexcept {

@@ -43,6 +43,13 @@ class AttachedProblem {
   ContactProblem problem_;
 };
 
+/// True if a frame holds the body by conditions.
+bool holds_hard(std::span<const Attachment> attachments) noexcept;
+
+/// Adds to the force of the first frame that holds the body so, if one does [N].
+void add_hard_force(std::span<const Attachment> attachments, const BodyPose& pose, const Eigen::Vector3d& force,
+                    AttachmentWorkspace& workspace) noexcept;
+
 /// Newton's method of the step of a body that a host holds, from workspace.q; likewise solve_with_contacts().
 NewtonReport solve_attached(const Model& model, const StepScene& scene, const State& state,
                             IncrementalPotential& potential, Workspace& workspace) noexcept;

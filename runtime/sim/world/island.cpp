@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/sim/step/attached_problem.h"
 #include "runtime/sim/step/contact_step.h"
 #include "runtime/sim/step/sleep.h"
 #include "runtime/sim/step/stepper.h"
@@ -100,8 +101,7 @@ void IslandProblem::collect_hard() {
       if (own.conditions() > 0) workspace_.hard.push_back({pair, &own});
   workspace_.framed.clear();
   for (std::size_t i = 0; i < bodies_.size(); ++i)
-    if (!body(i).full && holds_modes(body(i).state.attachments) && body(i).near().held.conditions() > 0)
-      workspace_.framed.push_back(static_cast<int>(i));
+    if (!body(i).full && holds_hard(body(i).state.attachments)) workspace_.framed.push_back(static_cast<int>(i));
   Conditions& conditions = workspace_.conditions;
   conditions.blocks.resize(2 * workspace_.hard.size() + workspace_.framed.size());
   Eigen::Index count = 0;
@@ -731,12 +731,6 @@ void end_accounts(std::span<WorldBody* const> bodies, std::span<PairContact* con
     for (PairContact* const pair : pairs) pair->scale_account(most / sum);
 }
 
-/// Number of the first attachment by which a frame holds a body hard.
-Eigen::Index first_hard(std::span<const Attachment> attachments) noexcept {
-  return std::ranges::find_if(attachments, [](const Attachment& own) { return own.holds() && own.conditions() > 0; }) -
-         attachments.begin();
-}
-
 /// The centre of mass goes exactly as the momentum, and the momentum as the forces have it, so that what the residual
 /// of Newton's method leaves of force would leave hard attachments open: their forces f become such that they close,
 /// and stay equal and opposite. Of the centres alone, x of attachment k moves against y by sum_j W_kj f_j, W of the
@@ -776,12 +770,7 @@ void settle(std::span<WorldBody* const> bodies, IslandWorkspace& workspace) noex
   const Eigen::MatrixXd forces = workspace.mobility_factor.solve(W.rightCols<3>());
   for (Eigen::Index k = pairs; k < count; ++k) {
     WorldBody& held = *bodies[static_cast<std::size_t>(workspace.framed[static_cast<std::size_t>(k - pairs)])];
-    const Eigen::Index first = first_hard(held.state.attachments);
-    const Attachment& own = held.state.attachments[static_cast<std::size_t>(first)];
-    const Eigen::Vector3d force = forces.row(k), arm = mean_of(own, held.pose()) - held.placement.position;
-    held.near().held.forces.col(first) += force;
-    held.near().held.sums.force += force;
-    held.near().held.sums.torque += arm.cross(force);
+    add_hard_force(held.state.attachments, held.pose(), forces.row(k), held.near().held);
   }
   for (Eigen::Index k = 0; k < pairs; ++k) {
     const HardAttachment& own = workspace.hard[static_cast<std::size_t>(k)];

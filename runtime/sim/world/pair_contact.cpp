@@ -37,7 +37,8 @@ std::optional<Eigen::Vector3d> way_out_of(const HeldPair& pair, const TouchingBo
       all += contact.overlap;
       deepest = std::max(deepest, contact.overlap);
     }
-  if (all > 0 && way.norm() > kOneWay * all) return way_out_of(first, second, way.normalized());
+  if (all == 0) return std::nullopt;
+  if (way.norm() > kOneWay * all) return way_out_of(first, second, way.normalized());
   const auto radius = [](const TouchingBody& body) { return body.touching.surface.bound(body.pose.q).radius; };
   if (!(deepest > kDeepOverlap * std::min(radius(first), radius(second)))) return std::nullopt;
   return way_out_of(first, second);

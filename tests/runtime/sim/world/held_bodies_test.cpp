@@ -146,10 +146,15 @@ TEST(HeldBody, StepsBesideAnotherAsAlone) {
   EXPECT_GE(together, 10);
 }
 
-// A load of 1 N is more than the frame bears.
+// A load of 1 N is more than the frame bears. A spring without force holds the body from then on.
 TEST(HeldBody, ThatAnotherLiesOnBreaksOff) {
   HeldBelow bodies(AttachmentKind::kFixed);
-  bodies.world->state(0).attachments[0].break_force = 1;
+  State& below = bodies.world->state(0);
+  below.attachments[0].break_force = 1;
+  below.attachments.push_back(
+      test::held_vertex(*bodies.blocks.model, bodies.blocks.bar, below, 1, AttachmentKind::kSpring));
+  below.attachments[1].stiffness = 1e-9;
+  bodies.world->fit_attachments(0);
   for (int i = 0; i < 50; ++i) bodies.world->step(1);
   EXPECT_TRUE(bodies.held().broken);
   EXPECT_EQ(bodies.held().force, Eigen::Vector3d::Zero());
